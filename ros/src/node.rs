@@ -13,12 +13,12 @@ use dermis_golden::data::text::Stated;
 use dermis_golden::engine::CheckPace;
 use dermis_host::recording::header;
 use dermis_host::stream::{
-    run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
+    run_together, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamAnswer, StreamOptions, ZeroRequest,
 };
 
 use crate::carrier::{Carrier, DdsNode, Publisher, Subscription, ZenohNode};
 use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
-use crate::engines::{Engine, Engines};
+use crate::engines::{Engines, PatchEngine};
 use crate::messages::{self, Messages};
 use crate::patches::{CarrierName, NodeFields, Patch, PatchFile};
 use crate::source::Reopened;
@@ -73,7 +73,7 @@ impl Outlet {
     }
 
     /// Publishes a result; what is large only while there is a subscriber.
-    fn publish(&self, answer: &Answer) -> Result<()> {
+    fn publish(&self, answer: &StreamAnswer) -> Result<()> {
         self.wrench.put(self.messages.wrench(answer)?)?;
         self.contacts.put(self.messages.contacts(answer)?)?;
         if self.arrows.is_wanted() {
@@ -94,7 +94,7 @@ impl Outlet {
 /// A patch of a worker.
 struct Own<'a> {
     patch: &'a Patch,
-    engine: &'a Engine,
+    engine: &'a PatchEngine,
     outlet: &'a Outlet,
 }
 

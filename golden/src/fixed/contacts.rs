@@ -15,7 +15,7 @@ use super::words::network::WordNetwork;
 
 /// The contacts of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Contacts {
+pub struct FrameContacts {
     /// Contact of each taxel, row-major, as [`segment`](segment::Segmented::labels) numbers them.
     pub labels: Vec<usize>,
     /// The contacts, that with the largest load first.
@@ -46,7 +46,7 @@ impl Passes<'_> {
         network: &WordNetwork,
         contacts: &ContactPlan,
         codes: &[i32],
-    ) -> (Contacts, QuadStream) {
+    ) -> (FrameContacts, QuadStream) {
         let (plan, formats, layout) = (self.plan, self.formats, self.layout);
         let first = self.first();
         let words: Vec<i64> = layout.unpack(&first.taxels).iter().map(|p| segment::word(formats, *p)).collect();
@@ -75,7 +75,7 @@ impl Passes<'_> {
             passes.operands.sheared.push(sheared);
         });
         let segment_cycles = found.cycles;
-        (Contacts { labels: found.labels, all, overflow: found.overflow, segment_cycles }, values)
+        (FrameContacts { labels: found.labels, all, overflow: found.overflow, segment_cycles }, values)
     }
 }
 

@@ -7,7 +7,7 @@
 //! ```
 
 use super::plan::contents::Plan;
-use super::stages::estimate::{estimate, images, Estimate};
+use super::stages::estimate::{estimate, images, MuWords};
 use super::stages::pass::{join_limbs, pass, swap, Operands};
 use super::stages::search::{search, Block, SearchResult};
 use super::stages::send::ln_sigma_word;
@@ -127,7 +127,7 @@ impl Passes<'_> {
 
     /// Evaluates the layers of the network; the images of each become operands. Those of whole groups of rows are passed on,
     /// zeros beyond the last.
-    pub fn evaluate(&mut self, network: &WordNetwork) -> Estimate {
+    pub fn evaluate(&mut self, network: &WordNetwork) -> MuWords {
         let (formats, last) = (self.formats, self.formats.layers.len() - 1);
         self.operands.layers.clear();
         for (index, rows) in formats.hidden_rows().enumerate() {

@@ -2,7 +2,7 @@
 
 use dermis_golden::wire::link::{code_bytes, Header, Kind, OVERHEAD};
 
-use super::Shape;
+use super::PacketParams;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::count_bits;
@@ -61,12 +61,12 @@ const UNKNOWN: u64 = 4;
 const LENGTH: u64 = 8;
 
 impl Parser {
-    /// For the frames and images of `shape`, whose payloads have at most 65535 bytes.
-    pub fn new(shape: &Shape) -> Self {
+    /// For the frames and images of `params`, whose payloads have at most 65535 bytes.
+    pub fn new(params: &PacketParams) -> Self {
         Parser {
-            frame_bytes: shape.codes() * code_bytes(shape.input_bits),
-            frame_kinds: shape.answers.requests().iter().map(|kind| *kind as u8).collect(),
-            image_bytes: shape.image_bytes,
+            frame_bytes: params.codes() * code_bytes(params.input_bits),
+            frame_kinds: params.answers.requests().iter().map(|kind| *kind as u8).collect(),
+            image_bytes: params.image_bytes,
         }
     }
 }

@@ -1,11 +1,11 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use dermis_cosim::faults::{interval, Row, Shares, LARGE};
+use dermis_cosim::faults::{interval, FaultRow, Shares, LARGE};
 use dermis_hdl::state::CLASSES;
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
-pub fn faults(rows: &[Row]) -> String {
+pub fn faults(rows: &[FaultRow]) -> String {
     let head = [
         "class",
         "stage",
@@ -21,7 +21,7 @@ pub fn faults(rows: &[Row]) -> String {
         "largest error",
         "not recovered",
     ];
-    let line = |row: &Row| {
+    let line = |row: &FaultRow| {
         let counts = [
             row.signals,
             row.bits,

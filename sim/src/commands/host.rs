@@ -20,7 +20,7 @@ use super::inputs::{frames_of, resolve, BoardOverride};
 use super::layout::LayoutArguments;
 use dermis_flow::progress::Progress;
 use dermis_host::link::stream::{self, FramesSent};
-use dermis_host::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
+use dermis_host::link::{open_board, BoardAnswer, LinkErrors, PhysicalAnswer, Session};
 use dermis_report as report;
 
 /// Arguments of `dermis host`.
@@ -190,7 +190,7 @@ fn refuse(arguments: &Arguments, scene: Option<&Scene>, scans: bool) -> Result<(
 }
 
 /// Asks for a scan and saves its readings.
-fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Frame, Answer)> {
+fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Frame, BoardAnswer)> {
     let (readings, answer) = session.scan(id)?;
     if let Some(folder) = save {
         write(&folder.join(format!("{id}.json")), readings.to_json().as_bytes())?;
@@ -202,7 +202,7 @@ fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Fram
 fn send<R>(
     session: &mut Session,
     requests: &[R],
-    mut ask: impl FnMut(&mut Session, &R) -> Result<(Frame, Answer)>,
+    mut ask: impl FnMut(&mut Session, &R) -> Result<(Frame, BoardAnswer)>,
 ) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);

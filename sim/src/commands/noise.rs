@@ -12,7 +12,7 @@
 use anyhow::Result;
 use clap::Args;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions};
 use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
@@ -150,7 +150,7 @@ struct ShapeArguments {
 
 /// A list of shapes.
 #[derive(Clone, Debug)]
-struct Shapes(Vec<Shape>);
+struct Shapes(Vec<ContactShape>);
 
 /// Runs the study: the table as text.
 ///
@@ -232,7 +232,7 @@ fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<Str
     report::presses(&rows, format)
 }
 
-fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: Format) -> Result<String> {
+fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[ContactShape], format: Format) -> Result<String> {
     let own = &arguments.shapes;
     let converter = Converter {
         gain_spread: own.gain_spread,

@@ -3,7 +3,7 @@
 use super::ascent::Prior;
 use super::cells::Cells;
 use super::envelope::Envelopes;
-use super::prior::Shape;
+use super::prior::ShapeCorrelation;
 use super::screen::Screen;
 use super::slip::SpreadPrior;
 use crate::estimate::learned::Learned;
@@ -29,7 +29,7 @@ const WITH_NETWORK: u64 = 2;
 pub struct Evidence {
     pub(in crate::estimate) cells: Cells,
     pub(in crate::estimate) envelopes: Envelopes,
-    pub(in crate::estimate) shape: Shape,
+    pub(in crate::estimate) shape: ShapeCorrelation,
     pub(super) segmenter: Segmenter,
     pub(super) prior: Prior,
     pub(super) spreads: SpreadPrior,
@@ -65,7 +65,7 @@ impl Evidence {
         let cells = Cells::new(sensor, scene.medium, length_mm);
         Evidence {
             envelopes: Envelopes::new(&cells, length_mm),
-            shape: Shape::new(&cells.grid, length_mm),
+            shape: ShapeCorrelation::new(&cells.grid, length_mm),
             segmenter: Segmenter::new(&cells.grid, WIDTH),
             cells,
             prior: Prior { mu_max: scene.search.mu_max },

@@ -3,7 +3,7 @@
 use super::coverage::{Coverage, Deviation};
 use super::matching::{found, partners};
 use super::statistic::{ErrorSpread, Interval};
-use dermis_golden::data::generator::draws::{DrawnFrame, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawnFrame};
 use dermis_golden::result::errors::Errors;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::sensor::Sensor;
@@ -13,7 +13,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Shape of the first contact.
-    pub shape: Shape,
+    pub shape: ContactShape,
     /// e_t of the resultant.
     pub tangential: Option<f64>,
     /// e_n of the resultant.

@@ -17,7 +17,7 @@ use super::StudyError;
 use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, DrawnFrame, Draws, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, DrawnFrame, Draws};
 use dermis_golden::data::generator::support::Kernels;
 use dermis_golden::estimate::deviations::Deviations;
 use dermis_golden::estimate::float::Golden;
@@ -299,7 +299,7 @@ pub fn shape_study(
                     unipolar: converter.unipolar,
                     told: study.told,
                     contacts: study.options.contacts,
-                    shape: shape.map_or("all", Shape::name),
+                    shape: shape.map_or("all", ContactShape::name),
                     estimator: estimator.clone(),
                     summary: Summary::of(&own.iter().map(|&k| &outcomes[k]).collect::<Vec<_>>()),
                     bound: BoundSpread::of(&own.iter().map(|&k| bound_errors[k].as_slice()).collect::<Vec<_>>()),
@@ -311,7 +311,7 @@ pub fn shape_study(
 }
 
 /// All shapes together, then each of them if wanted.
-fn groups(study: &ShapeStudy) -> Vec<Option<Shape>> {
+fn groups(study: &ShapeStudy) -> Vec<Option<ContactShape>> {
     let own = study.options.shapes.iter().copied().map(Some).filter(|_| study.by_shape);
     std::iter::once(None).chain(own).collect()
 }

@@ -2,14 +2,14 @@
 
 use super::*;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions};
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, PartitionSpec, Scene};
 
 /// Medians of few contacts scatter; the ratios of the full study are below 1.3.
 const RATIO: f64 = 1.5;
 
-fn rows(scene: &str, levels: Vec<f64>, objectives: Vec<ObjectiveKind>, frames: usize) -> Vec<Row> {
+fn rows(scene: &str, levels: Vec<f64>, objectives: Vec<ObjectiveKind>, frames: usize) -> Vec<NoiseRow> {
     let scene = Scene::builtin(scene).unwrap();
     let wanted = Study { levels, draws: 40, seed: 5, objectives, frames };
     study(&scene, &wanted, &mut |_, _| ()).unwrap()
@@ -137,7 +137,8 @@ fn several_contacts_have_their_own_errors() {
 #[test]
 fn unipolar_readings_untold_noise_and_shapes_are_rows() {
     let converter = Converter { unipolar: true, ..Default::default() };
-    let options = DrawOptions { converter, shapes: vec![Shape::Ring, Shape::Tilted], ..Default::default() };
+    let options =
+        DrawOptions { converter, shapes: vec![ContactShape::Ring, ContactShape::Tilted], ..Default::default() };
     let run = |told| {
         let wanted = ShapeStudy {
             levels: vec![2e-3],
@@ -197,7 +198,7 @@ fn standard_deviations_of_the_network_are_honest() {
 /// stated.
 #[test]
 fn the_hardware_on_bonded_layers_meets_its_limits() {
-    let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+    let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
     let study = ShapeStudy {
         levels: vec![2e-3],
         draws: 102,

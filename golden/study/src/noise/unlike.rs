@@ -24,7 +24,7 @@ use super::StudyError;
 use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Draws, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, Draws};
 use dermis_golden::data::generator::GeneratorError;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::estimate::learned::{LearnedError, Signature, GAINS, NOISE, RATIO};
@@ -190,7 +190,7 @@ impl Like<'_> {
     fn read(&self, scene: &Scene, number: u64, ratio: [f64; 2], noise: f64) -> Result<Reading, GeneratorError> {
         let wanted = 1 + (number % self.most as u64) as usize;
         let draw = |contacts: usize| {
-            let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+            let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
             let ratio = ratio.map(|ratio| ratio * scene.search.mu_max);
             Draws::new(scene, DrawOptions { shapes, contacts, ratio, seed: self.seed, ..Default::default() })?
                 .frame(number)

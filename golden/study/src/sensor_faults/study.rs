@@ -36,12 +36,12 @@ const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 /// What computes, and how it receives a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path {
-    engine: Engine,
+    engine: StudyEngine,
     stream: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Engine {
+enum StudyEngine {
     Golden,
     Stated,
     Fixed,
@@ -50,28 +50,28 @@ enum Engine {
 
 /// The engines, each as `dermis reconstruct --frame` and `--stream` run it.
 pub const ENGINES: [Path; 8] = [
-    Path { engine: Engine::Golden, stream: false },
-    Path { engine: Engine::Golden, stream: true },
-    Path { engine: Engine::Stated, stream: false },
-    Path { engine: Engine::Stated, stream: true },
-    Path { engine: Engine::Fixed, stream: false },
-    Path { engine: Engine::Fixed, stream: true },
-    Path { engine: Engine::Network, stream: false },
-    Path { engine: Engine::Network, stream: true },
+    Path { engine: StudyEngine::Golden, stream: false },
+    Path { engine: StudyEngine::Golden, stream: true },
+    Path { engine: StudyEngine::Stated, stream: false },
+    Path { engine: StudyEngine::Stated, stream: true },
+    Path { engine: StudyEngine::Fixed, stream: false },
+    Path { engine: StudyEngine::Fixed, stream: true },
+    Path { engine: StudyEngine::Network, stream: false },
+    Path { engine: StudyEngine::Network, stream: true },
 ];
 
 impl Path {
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match (self.engine, self.stream) {
-            (Engine::Golden, false) => "golden, frame",
-            (Engine::Golden, true) => "golden, stream",
-            (Engine::Stated, false) => "golden, noise stated, frame",
-            (Engine::Stated, true) => "golden, noise stated, stream",
-            (Engine::Fixed, false) => "fixed, frame",
-            (Engine::Fixed, true) => "fixed, stream",
-            (Engine::Network, false) => "fixed with network, frame",
-            (Engine::Network, true) => "fixed with network, stream",
+            (StudyEngine::Golden, false) => "golden, frame",
+            (StudyEngine::Golden, true) => "golden, stream",
+            (StudyEngine::Stated, false) => "golden, noise stated, frame",
+            (StudyEngine::Stated, true) => "golden, noise stated, stream",
+            (StudyEngine::Fixed, false) => "fixed, frame",
+            (StudyEngine::Fixed, true) => "fixed, stream",
+            (StudyEngine::Network, false) => "fixed with network, frame",
+            (StudyEngine::Network, true) => "fixed with network, stream",
         }
     }
 }
@@ -207,16 +207,16 @@ impl Press {
 }
 
 /// What an engine says of a frame.
-struct Answer {
+struct EngineAnswer {
     flags: BTreeSet<Flag>,
     force_N: [f64; 3],
     sigma_N: Option<[f64; 3]>,
 }
 
-impl Answer {
-    fn of(result: &Reconstruction) -> Answer {
+impl EngineAnswer {
+    fn of(result: &Reconstruction) -> EngineAnswer {
         let flags = result.flags.iter().copied().collect();
-        Answer { flags, force_N: result.resultant_N, sigma_N: result.sigma_N() }
+        EngineAnswer { flags, force_N: result.resultant_N, sigma_N: result.sigma_N() }
     }
 }
 
@@ -241,15 +241,20 @@ impl Engines<'_> {
     }
 
     /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it, or the scene has it not.
-    fn answers(&self, engine: Engine, stream: &[Vec<f64>], noise_MPa: f64) -> Result<[Option<Answer>; 2], StudyError> {
+    fn answers(
+        &self,
+        engine: StudyEngine,
+        stream: &[Vec<f64>],
+        noise_MPa: f64,
+    ) -> Result<[Option<EngineAnswer>; 2], StudyError> {
         let frames = stream.iter().map(|stress| Frame::from_stress("spoiled", &self.scene.sensor, stress.clone()));
         let frames: Vec<Frame> = frames.collect::<Result<_, _>>()?;
         let Some(last) = frames.last() else { return Ok([None, None]) };
         let result = match engine {
-            Engine::Golden => self.golden.run(last).map_err(StudyError::from),
-            Engine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
-            Engine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
-            Engine::Network => match &self.network {
+            StudyEngine::Golden => self.golden.run(last).map_err(StudyError::from),
+            StudyEngine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
+            StudyEngine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
+            StudyEngine::Network => match &self.network {
                 Some(network) => network.result(std::slice::from_ref(last), true).map_err(StudyError::from),
                 None => return Ok([None, None]),
             },
@@ -269,19 +274,19 @@ impl Engines<'_> {
             let checks = history.add(std::slice::from_ref(frame), in_stream.checks);
             in_stream.diagnostics().add_checks(self.scene, checks);
         }
-        Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
+        Ok([result, in_stream].map(|result| Some(EngineAnswer::of(&result))))
     }
 
     /// The verdicts of all [`ENGINES`] on a press with a fault; a clean press has the noise of its size.
     fn judge(&self, press: &Press, fault: &Fault, size: f64, noise: f64) -> Result<Vec<Judged>, StudyError> {
         let mut all = Vec::with_capacity(ENGINES.len());
-        for engine in [Engine::Golden, Engine::Stated, Engine::Fixed, Engine::Network] {
+        for engine in [StudyEngine::Golden, StudyEngine::Stated, StudyEngine::Fixed, StudyEngine::Network] {
             let noise = if fault.kind == Kind::Clean { size } else { noise_of(engine, noise) };
             let stream = press.spoiled(&self.scene.sensor, fault, size, noise);
             let last = stream.last().map_or(&[][..], |last| last);
             let truth_N = (fault.kind != Kind::NoContact).then_some(press.total_N);
             let answers = self.answers(engine, &stream, noise * press.peak_MPa)?;
-            let absent = engine == Engine::Network && self.network.is_none();
+            let absent = engine == StudyEngine::Network && self.network.is_none();
             all.extend(answers.map(|answer| match answer {
                 Some(answer) => Judged::Result(answer.judged(&self.scene.sensor, last, truth_N)),
                 None if absent => Judged::Absent,
@@ -293,9 +298,9 @@ impl Engines<'_> {
 }
 
 /// Noise over the peak of the frames that an engine gets.
-fn noise_of(engine: Engine, noise: f64) -> f64 {
+fn noise_of(engine: StudyEngine, noise: f64) -> f64 {
     match engine {
-        Engine::Stated if noise == 0.0 => STATED,
+        StudyEngine::Stated if noise == 0.0 => STATED,
         _ => noise,
     }
 }
@@ -318,7 +323,7 @@ struct Verdict {
     z: Option<f64>,
 }
 
-impl Answer {
+impl EngineAnswer {
     /// Compared with the true force; `None` where nothing presses.
     fn judged(self, sensor: &Sensor, last: &[f64], truth_N: Option<[f64; 3]>) -> Verdict {
         let (tangential, normal, none) = RIGHT;

@@ -72,7 +72,7 @@ pub struct Outcome {
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ExtremeRow {
     /// Id of the frame.
     pub frame: String,
     /// Result of the floating-point model.
@@ -174,7 +174,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
 ///
 /// # Errors
 /// [`GoldenError`] if the golden model rejects scene or frame.
-pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
+pub fn outcome(extreme: &Extreme) -> Result<ExtremeRow, GoldenError> {
     let Extreme { scene, frame } = extreme;
     let golden = Golden::reference(scene)?.run(frame)?;
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
@@ -186,7 +186,7 @@ pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
         Ok((result, status)) => (Some(of(&result)), status, None),
         Err(error) => (None, String::new(), Some(error.to_string())),
     };
-    Ok(Row { frame: frame.id.clone(), golden: of(&golden), fixed, status, refused })
+    Ok(ExtremeRow { frame: frame.id.clone(), golden: of(&golden), fixed, status, refused })
 }
 
 fn of(result: &Reconstruction) -> Outcome {

@@ -78,7 +78,7 @@ impl<'k> Circuit<'k> {
         let unlinks = k.wire("unlinks", self.is(JOIN) & follows.equals(*gone));
         let next = k.delay("next", unlinks.mux(*after, follows));
         let unlinks = k.delay("unlinked", unlinks);
-        let [best, hold] = ["best", "hold"].map(|name| register(name, self.shape.smoothed));
+        let [best, hold] = ["best", "hold"].map(|name| register(name, self.params.smoothed));
         let list = List { outer, into, gone, found, small, ranks, best, hold, follows, next, unlinks, after };
         self.saddles(order, &list);
         let less = self.loads(&list);
@@ -89,7 +89,7 @@ impl<'k> Circuit<'k> {
 
     /// The saddles and the bars; which pair is to be joined.
     fn saddles(&self, order: &Order<'k>, list: &List<'k>) {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         let one = k.constant(1, 1);
         k.comment("Saddles");
         let basin = self.memories.steps_out.low(BASIN);
@@ -129,11 +129,11 @@ impl<'k> Circuit<'k> {
         let lower = k.wire("lower_ordered", turned.mux(*self.higher, *self.lower));
         let higher = k.wire("higher_ordered", turned.mux(*self.lower, *self.higher));
         let place = lower.concat(higher);
-        let memory = k.memory("saddles", TABLE * TABLE, shape.smoothed, Contents::Undefined).unchecked();
+        let memory = k.memory("saddles", TABLE * TABLE, params.smoothed, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Saddles);
         let saddle = k.delay("saddle", k.delay("saddle_read", memory.read(place)));
         let larger = k.wire("larger", list.best.less(saddle));
-        let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
+        let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(params.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
         let least =
             k.delay("is_less", self.multiplier.difference.top()).mux(self.memories.words_out, *self.multiplier.base);
@@ -166,8 +166,8 @@ impl<'k> Circuit<'k> {
     /// The loads, and the sums of the contacts: whether one is less than what is held. A sum is there two cycles after its
     /// place is chosen, and may be written then.
     fn loads(&self, list: &List<'k>) -> Expr<'k> {
-        let (k, shape) = (self.k, self.shape);
-        let contact = count_bits(shape.most);
+        let (k, params) = (self.k, self.params);
+        let contact = count_bits(params.most);
         k.comment("Loads and sums");
         let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
         // In LABEL 0, 1, 2 at the ticks 1, 2, 3; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
@@ -191,8 +191,8 @@ impl<'k> Circuit<'k> {
         let begins = k.wire("begins_list", scans & !place.any());
         let takes = k.wire("takes_load", scans & place.any() & (less ^ *list.ranks));
         k.when(begins | takes | self.at(JOIN, 2) | self.at(MIDDLE, 2), || {
-            let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(shape.sum);
-            held.set(begins.mux(whole & (!*list.ranks).repeat(shape.sum), load));
+            let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(params.sum);
+            held.set(begins.mux(whole & (!*list.ranks).repeat(params.sum), load));
         });
         // Half a unit more makes a comparison one of "at most".
         k.when(begins, || {
@@ -217,11 +217,11 @@ impl<'k> Circuit<'k> {
         let compares = self.is(MIDDLE) & !self.tick.at(0) & self.tick.any();
         let holds = k.delay("holds", compares | self.is(JOIN));
         let subtracts = k.delay("subtracts", compares);
-        let held = *held ^ subtracts.repeat(shape.sum);
-        let addend = holds.mux(held, self.multiplier.product.resize(shape.sum));
-        let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
+        let held = *held ^ subtracts.repeat(params.sum);
+        let addend = holds.mux(held, self.multiplier.product.resize(params.sum));
+        let total = k.wire("load_total", (load + addend + subtracts).low(params.sum));
         // A moment is not read again when it is less than what is held.
-        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));
+        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(params.sum));
         less
     }
 
@@ -273,7 +273,7 @@ impl<'k> Circuit<'k> {
         });
         self.enter(merged & ends, [JOIN, LEAST], || ());
 
-        let full = self.kept.is(self.shape.most as u64);
+        let full = self.kept.is(self.params.most as u64);
         self.enter(self.at(TAKE, 1), [TAKE, LEAST], || {
             self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
         });

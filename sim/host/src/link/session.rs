@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use super::answer::Answer;
+use super::answer::BoardAnswer;
 use super::board::{load, Board};
 use super::client::Client;
 use super::error::HostError;
@@ -71,7 +71,7 @@ impl Session {
     ///
     /// # Errors
     /// A frame of another sensor, a board that scans its array, no answer.
-    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, BoardAnswer)> {
         if self.identity.scans() {
             bail!("hardware.source = adc-scan: the board scans its array and takes no frames");
         }
@@ -87,7 +87,7 @@ impl Session {
     ///
     /// # Errors
     /// A board that does not scan, no answer.
-    pub fn scan(&mut self, id: &str) -> Result<(Frame, Answer)> {
+    pub fn scan(&mut self, id: &str) -> Result<(Frame, BoardAnswer)> {
         if !self.identity.scans() {
             bail!("hardware.source = stream: the board takes frames and scans no array");
         }
@@ -114,13 +114,13 @@ impl Session {
         codes.into_iter().map(|code| code >> left_out << left_out).collect()
     }
 
-    fn ask(&mut self, codes: &[i32]) -> Result<Answer, HostError> {
+    fn ask(&mut self, codes: &[i32]) -> Result<BoardAnswer, HostError> {
         let forces = self.asks_forces();
         self.board.frame(&self.model, codes, forces)
     }
 
     /// The answer compared with the model if requested, with the forces that the user wants.
-    fn checked(&self, mut answer: Answer, codes: &[i32]) -> Answer {
+    fn checked(&self, mut answer: BoardAnswer, codes: &[i32]) -> BoardAnswer {
         if self.check {
             answer.difference = Some(answer.compare_with_model(&self.model, codes));
         }

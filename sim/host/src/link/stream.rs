@@ -12,7 +12,7 @@ use dermis_golden::fixed::Model;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::answer::{Answer, PhysicalAnswer};
+use super::answer::{BoardAnswer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
 use crate::stream::acquisition::Acquisition;
@@ -48,7 +48,7 @@ impl Reply {
         id: Value,
         (stated_ns, sent): (Option<i64>, SystemTime),
         readings: &Frame,
-        answer: &Answer,
+        answer: &BoardAnswer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
         checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.diagnostics());

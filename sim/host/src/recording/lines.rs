@@ -163,7 +163,7 @@ impl Read for Lines {
 mod tests {
     use super::*;
     use crate::recording::Recorder;
-    use crate::stream::{Answer, Outcome};
+    use crate::stream::{Outcome, StreamAnswer};
     use dermis_golden::data::frame::Frame;
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::Scene;
@@ -179,7 +179,7 @@ mod tests {
         for (sequence, received_s) in (0..).zip(seconds) {
             let (received_s, frames) = (*received_s, &frames[..]);
             let time_ns = (received_s * 1e9).round() as i64;
-            let answer = Answer {
+            let answer = StreamAnswer {
                 sequence,
                 line: sequence + 1,
                 received_s,

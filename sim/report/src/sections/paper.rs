@@ -14,7 +14,7 @@ use dermis_study::paper::conclusions;
 use super::super::document::{
     count, empty_cell, percent, seconds, text_cell, two_digits, Cell, Item, Picture, Section, Table,
 };
-use super::super::measure::{Engine, Measured, Options};
+use super::super::measure::{Implementation, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
 use super::fields::field_pictures;
@@ -185,7 +185,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         row.push(faster(whole.and_then(|(m, _)| printed(m)), printed(m)));
         row.push(faster(whole.and_then(|(_, repeats)| middle(repeats)), middle(repeats)));
         let frame = |engine| m.point(engine).map(|point| point.seconds);
-        row.extend([seconds(frame(Engine::Golden)), seconds(frame(Engine::Hardware))]);
+        row.extend([seconds(frame(Implementation::Golden)), seconds(frame(Implementation::Hardware))]);
         row
     });
     let head = [
@@ -260,7 +260,7 @@ fn conclusions_table(measured: &[Measured]) -> Table {
         let name = format!("sensor-{}", conclusion.sensor);
         let own = measured.iter().filter(|m| m.scene.name == name);
         let errors: Vec<(Case, f64)> =
-            own.filter_map(|m| Some((m.scene.partition.case, m.point(Engine::Golden)?.tangential?))).collect();
+            own.filter_map(|m| Some((m.scene.partition.case, m.point(Implementation::Golden)?.tangential?))).collect();
         let least = |cut: bool| {
             let all = errors.iter().filter(|(case, _)| !cut || *case != Case::WHOLE);
             all.min_by(|a, b| a.1.total_cmp(&b.1)).copied()

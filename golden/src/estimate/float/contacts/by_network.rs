@@ -15,8 +15,8 @@
 //! | in: stress, network | n, – | MPa |
 //! | out: p, regions, μ of each with standard deviations | n, n, count × 2 | N, –, – |
 
-use super::{Contacts, Solver};
-use crate::estimate::float::objective::Estimate;
+use super::{SolvedContacts, Solver};
+use crate::estimate::float::objective::MuEstimate;
 use crate::estimate::learned::{Gaussian, Learned, OneContact};
 use crate::estimate::segment::{basins, WIDTH};
 use crate::result::reconstruct::Resultant;
@@ -24,7 +24,7 @@ use crate::result::reconstruct::Resultant;
 /// Contacts with the standard deviations of their μ.
 pub(crate) struct NetworkContacts {
     /// Regions, μ and p.
-    pub contacts: Contacts,
+    pub contacts: SolvedContacts,
     /// Standard deviation of the μ of each region, [x, y]; `None` where the network was not evaluated.
     pub sigma: Vec<Option<[f64; 2]>>,
     /// Whether there are more contacts than the network may be evaluated for.
@@ -38,8 +38,13 @@ impl Solver<'_> {
         let found = basins(&self.matrices.sensor, self.p0, WIDTH);
         let (largest, overflow) = (found.by_load(), found.overflow);
         let segments = found.segments;
-        let mut contacts =
-            Contacts { found: vec![None; segments.count], segments, p: self.p0.to_vec(), sweeps: 1, converged: true };
+        let mut contacts = SolvedContacts {
+            found: vec![None; segments.count],
+            segments,
+            p: self.p0.to_vec(),
+            sweeps: 1,
+            converged: true,
+        };
         let evaluate = |region: usize| {
             let centre_mm = self.centre_mm(&contacts, region);
             network.shear(&OneContact { b, alive, centre_mm })
@@ -48,7 +53,7 @@ impl Solver<'_> {
         let searched = |region: usize| is_large(region) && (self.searched)(&contacts.segments, region);
         let outputs: Vec<Option<Gaussian>> =
             (0..contacts.segments.count).map(|region| searched(region).then(|| evaluate(region))).collect();
-        let found = |output: &Gaussian| Estimate::of_network(output, self.mu_max).found;
+        let found = |output: &Gaussian| MuEstimate::of_network(output, self.mu_max).found;
         contacts.found = outputs.iter().map(|output| output.as_ref().map(found)).collect();
         self.relax(&mut contacts);
         let sigma = outputs.iter().map(|output| output.map(|output| output.sigma)).collect();
@@ -56,7 +61,7 @@ impl Solver<'_> {
     }
 
     /// Centre of the compressive forces on a region in mm from the array's centre, which stands for that of none.
-    fn centre_mm(&self, contacts: &Contacts, region: usize) -> [f64; 2] {
+    fn centre_mm(&self, contacts: &SolvedContacts, region: usize) -> [f64; 2] {
         let own = Resultant::of(&self.matrices.sensor, &contacts.forces(), contacts.segments.taxels(region));
         own.centre_mm.unwrap_or_default()
     }
