@@ -54,7 +54,7 @@ impl Outlet {
         let topics = PatchTopics::new(&file.node.namespace, patch);
         let optional = |topic: &Option<topics::Topic>| topic.as_ref().map(|own| carrier.publisher(own)).transpose();
         let zero = ZeroRequest::default();
-        let asked = zero.clone();
+        let zero_request = zero.clone();
         let scene = carrier.publisher(&topics.scene)?;
         scene.put(messages::scene(patch)?)?;
         Ok(Outlet {
@@ -66,7 +66,7 @@ impl Outlet {
             forces: optional(&topics.forces)?,
             stress: optional(&topics.stress)?,
             _scene: scene,
-            _tare: carrier.subscription(&topics.tare, Box::new(move || asked.now()))?,
+            _tare: carrier.subscription(&topics.tare, Box::new(move || zero_request.now()))?,
             zero,
             period: file.node.rate_Hz.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate)),
         })

@@ -75,17 +75,17 @@ impl Block for ScanCore {
         let sequencer = k.instance("sequencer", ScanSequencer::new(&self.params));
         let capture = k.instance("capture", ScanCapture::new(&self.params));
         let engine = k.instance("engine", &self.engine);
-        let told = k.instance("told", ScanStatus::new(self.forces));
+        let scan_status = k.instance("told", ScanStatus::new(self.forces));
         k.comment("Registered, because the engine is large and its reset has a long route.");
         restart.d.set(io.rst);
-        let restarts = [&sequencer.rst, &capture.rst, &engine.rst, &told.rst];
+        let restarts = [&sequencer.rst, &capture.rst, &engine.rst, &scan_status.rst];
         let of_tables: Vec<&Net> =
             tables.iter().map(|tables| &tables.rst).chain(codes.iter().map(|codes| &codes.rst)).collect();
         restarts.into_iter().chain(of_tables).for_each(|rst| rst.set(restart.q));
 
         k.comment("Scan");
         sequencer.clear.set(capture.clear);
-        let room = told.room & io.enable;
+        let room = scan_status.room & io.enable;
         sequencer.room.set(codes.as_ref().map_or(room, |codes| room & codes.room));
         io.row.set(sequencer.row);
         io.adc_sclk.set(sequencer.sclk);
@@ -115,10 +115,10 @@ impl Block for ScanCore {
         }
 
         k.comment("Forces, and marks in the status");
-        told.complete.set(tables.as_ref().map_or(capture.complete, |tables| tables.complete));
-        told.rail.set(capture.rail);
-        told.other.set(capture.other);
-        engine.m_axis.connect(&told.s_axis);
+        scan_status.complete.set(tables.as_ref().map_or(capture.complete, |tables| tables.complete));
+        scan_status.rail.set(capture.rail);
+        scan_status.other.set(capture.other);
+        engine.m_axis.connect(&scan_status.s_axis);
         match tables.as_ref().zip(codes.as_ref()) {
             Some((tables, codes)) => {
                 k.unused([capture.complete]);
@@ -126,10 +126,10 @@ impl Block for ScanCore {
                 codes.passed.set(tables.passed);
                 codes.complete.set(tables.complete);
                 codes.broken.set(tables.broken);
-                told.m_axis.connect(&codes.s_axis);
+                scan_status.m_axis.connect(&codes.s_axis);
                 codes.m_axis.connect(&io.m_axis);
             }
-            None => told.m_axis.connect(&io.m_axis),
+            None => scan_status.m_axis.connect(&io.m_axis),
         }
     }
 }

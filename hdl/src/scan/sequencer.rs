@@ -203,16 +203,16 @@ pub(super) mod tests {
     }
 
     /// What belongs to the end of a frame: `result` to `alive`.
-    type Told = [u64; 6];
+    type ConversionEnd = [u64; 6];
     /// Row, CS low, SCLK away from idle, MOSI where it is defined; for the end of a frame what belongs to it.
-    type Pins = (u64, bool, bool, Option<u64>, Option<Told>);
+    type Pins = (u64, bool, bool, Option<u64>, Option<ConversionEnd>);
 
     /// The pins of a scan, cycle by cycle, written down as the documentation of [`Timing`] says.
     struct Schedule {
         params: ScanParams,
         pins: Vec<Pins>,
         at: Option<usize>,
-        told: Vec<Option<Told>>,
+        ended: Vec<Option<ConversionEnd>>,
         took: bool,
     }
 
@@ -252,7 +252,7 @@ pub(super) mod tests {
             }
             assert_eq!(pins.len() as u64, 1 + timing.scan);
             pins.resize(timing.period as usize, (0, false, false, None, None));
-            Schedule { params: params.clone(), pins, at: None, told: vec![None; 2], took: false }
+            Schedule { params: params.clone(), pins, at: None, ended: vec![None; 2], took: false }
         }
     }
 
@@ -261,7 +261,7 @@ pub(super) mod tests {
             let Some(at) = self.at else { return vec![None; 12] };
             let (row, low, clocked, mosi, _) = self.pins[at % self.pins.len()];
             let bit = |bit: bool| Some(Word::from(bit));
-            let done = self.told[0];
+            let done = self.ended[0];
             let of = |k: usize| done.filter(|of| k == 0 || of[0] == 1).map(|of| Word::from(of[k]));
             let idle = self.params.scan.converter.idle_high;
             vec![
@@ -288,10 +288,10 @@ pub(super) mod tests {
             let here = self.pins[at % self.pins.len()];
             let next = self.pins[(at + 1) % self.pins.len()];
             self.took = here.2 && !next.2;
-            self.told[0] = here.4;
+            self.ended[0] = here.4;
             self.at = Some(if inputs[0].number() == 1 { 0 } else { at + 1 });
             if inputs[0].number() == 1 {
-                (self.took, self.told[0]) = (false, None);
+                (self.took, self.ended[0]) = (false, None);
             }
         }
     }

@@ -1,11 +1,11 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use dermis_cosim::faults::{interval, FaultRow, Shares, LARGE};
+use dermis_cosim::faults::{interval, BitFlipRow, Shares, LARGE};
 use dermis_hdl::state::CLASSES;
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
-pub fn faults(rows: &[FaultRow]) -> String {
+pub fn faults(rows: &[BitFlipRow]) -> String {
     let head = [
         "class",
         "stage",
@@ -21,7 +21,7 @@ pub fn faults(rows: &[FaultRow]) -> String {
         "largest error",
         "not recovered",
     ];
-    let line = |row: &FaultRow| {
+    let line = |row: &BitFlipRow| {
         let counts = [
             row.signals,
             row.bits,

@@ -202,13 +202,13 @@ fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Fram
 fn send<R>(
     session: &mut Session,
     requests: &[R],
-    mut ask: impl FnMut(&mut Session, &R) -> Result<(Frame, BoardAnswer)>,
+    mut exchange: impl FnMut(&mut Session, &R) -> Result<(Frame, BoardAnswer)>,
 ) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
     let check = CrossCheck::of(&session.model);
     for (index, request) in requests.iter().enumerate() {
-        let (readings, answer) = ask(session, request)?;
+        let (readings, answer) = exchange(session, request)?;
         let checked = |resultant_N: [f64; 3], diagnostics: &mut Diagnostics| {
             check.iter().for_each(|check| check.check(std::slice::from_ref(&readings), resultant_N, diagnostics));
         };

@@ -250,9 +250,9 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[ContactShape], fo
         converter,
         ..Default::default()
     };
-    let (draws, told, by_shape) = (arguments.draws, !own.unstated, own.coverage);
+    let (draws, noise_stated, by_shape) = (arguments.draws, !own.unstated, own.coverage);
     let candidates = candidates(arguments);
-    let mut wanted = ShapeStudy { draws, options, told, candidates, by_shape, ..Default::default() };
+    let mut wanted = ShapeStudy { draws, options, noise_stated, candidates, by_shape, ..Default::default() };
     if !arguments.levels.is_empty() {
         wanted.levels = arguments.levels.clone();
     }

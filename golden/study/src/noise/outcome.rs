@@ -69,8 +69,8 @@ impl Outcome {
             outcome.contact_tangential.extend(Errors::new(truth.force_N, force_N).tangential);
             let Some(found) = partner else { continue };
             // The deviations of the array are not those of one of several contacts.
-            let told = result.contacts().is_some() || drawn.truth.len() == 1;
-            if let Some([x, y]) = found.shear_sigma_N.filter(|_| told) {
+            let is_of_contact = result.contacts().is_some() || drawn.truth.len() == 1;
+            if let Some([x, y]) = found.shear_sigma_N.filter(|_| is_of_contact) {
                 let off = |axis: usize, sigma: f64| (force_N[axis] - truth.force_N[axis]).abs() / sigma;
                 let normal = found.normal_sigma_N.map(|sigma| off(2, sigma));
                 outcome.deviations.push(Deviation { shear: [off(0, x), off(1, y)], normal });

@@ -397,32 +397,32 @@ fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
 /// fits.
 pub fn sensor_faults(
     scenes: &[Scene],
-    asked: &SensorFaults,
+    study: &SensorFaults,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<FaultRow>, StudyError> {
-    let lines = lines(asked)?;
+    let lines = lines(study)?;
     let engines = scenes.iter().map(Engines::new).collect::<Result<Vec<_>, _>>()?;
-    let presses = scenes.iter().map(|scene| presses(scene, asked)).collect::<Result<Vec<_>, _>>()?;
+    let presses = scenes.iter().map(|scene| presses(scene, study)).collect::<Result<Vec<_>, _>>()?;
     let tasks_of = |fault: &'static Fault, size: f64| {
-        let most = if fault.kind == Kind::NoContact { NO_CONTACT_FRAMES } else { asked.frames };
-        let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(asked.frames)).map(move |press| (scene, press)));
+        let most = if fault.kind == Kind::NoContact { NO_CONTACT_FRAMES } else { study.frames };
+        let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(study.frames)).map(move |press| (scene, press)));
         all.map(move |(scene, press)| Task { scene, fault, size, press })
     };
     // Clean frames with the noise of each engine, whose flags say nothing of a fault.
     let clean = &FAULTS[0];
-    let noises = if asked.noise == 0.0 { vec![0.0, STATED] } else { vec![asked.noise] };
+    let noises = if study.noise == 0.0 { vec![0.0, STATED] } else { vec![study.noise] };
     let controls: Vec<Task> = noises.into_iter().flat_map(|noise| tasks_of(clean, noise)).collect();
     let tasks: Vec<Task> = lines.iter().flat_map(|(fault, size)| tasks_of(fault, *size)).collect();
     let step = steps(progress, controls.len() + tasks.len());
     let judge = |task: &Task| {
-        let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, asked.noise);
+        let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, study.noise);
         step();
         judged
     };
     let judged = |tasks: &[Task]| tasks.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>, StudyError>>();
     let (control, spoiled) = (judged(&controls)?, judged(&tasks)?);
     let carried = |scene: usize, path: usize| {
-        let noise = noise_of(ENGINES[path].engine, asked.noise);
+        let noise = noise_of(ENGINES[path].engine, study.noise);
         let own = std::iter::zip(&controls, &control).filter(|(task, _)| task.scene == scene && task.size == noise);
         always(&own.map(|(_, judged)| &judged[path]).collect::<Vec<_>>())
     };
@@ -445,15 +445,15 @@ pub fn sensor_faults(
 /// A spoiled frame: the fault, its size in words, the readings.
 pub type Spoiled = (&'static str, String, Frame);
 
-/// The last frame of every press, spoiled by every fault of every size that `asked` names, as the engines without stated noise get it.
+/// The last frame of every press, spoiled by every fault of every size that `study` names, as the engines without stated noise get it.
 ///
 /// # Errors
 /// As [`sensor_faults`].
-pub fn spoiled_frames(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Spoiled>, StudyError> {
-    let (lines, presses) = (lines(asked)?, presses(scene, asked)?);
+pub fn spoiled_frames(scene: &Scene, study: &SensorFaults) -> Result<Vec<Spoiled>, StudyError> {
+    let (lines, presses) = (lines(study)?, presses(scene, study)?);
     let all = lines.iter().flat_map(|line| presses.iter().map(move |press| (*line, press)));
     let spoiled = |((fault, size), press): ((&'static Fault, f64), &Press)| {
-        let noise = if fault.kind == Kind::Clean { size } else { asked.noise };
+        let noise = if fault.kind == Kind::Clean { size } else { study.noise };
         let last = press.spoiled(&scene.sensor, fault, size, noise).pop().unwrap_or_default();
         Ok((fault.name, fault.unit.text(size), Frame::from_stress("spoiled", &scene.sensor, last)?))
     };
@@ -461,41 +461,41 @@ pub fn spoiled_frames(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Spoiled
 }
 
 /// The faults that are asked for, with the sizes that are measured.
-fn lines(asked: &SensorFaults) -> Result<Vec<(&'static Fault, f64)>, StudyError> {
-    let sizes = |fault: &'static Fault| match asked.quick {
+fn lines(study: &SensorFaults) -> Result<Vec<(&'static Fault, f64)>, StudyError> {
+    let sizes = |fault: &'static Fault| match study.quick {
         true => &fault.sizes[fault.sizes.len() / 2..][..1],
         false => fault.sizes,
     };
     let with_sizes = |fault: &'static Fault| sizes(fault).iter().map(move |size| (fault, *size));
-    Ok(chosen(asked)?.into_iter().flat_map(with_sizes).collect())
+    Ok(chosen(study)?.into_iter().flat_map(with_sizes).collect())
 }
 
 /// The faults that are asked for.
-fn chosen(asked: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
+fn chosen(study: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
     let fail = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
-    if !(1..=MOST_FRAMES).contains(&asked.frames) {
-        return fail("frames", asked.frames.to_string(), "a whole number from 1 to 100000");
+    if !(1..=MOST_FRAMES).contains(&study.frames) {
+        return fail("frames", study.frames.to_string(), "a whole number from 1 to 100000");
     }
-    if !(asked.noise >= 0.0 && asked.noise <= 1.0) {
-        return fail("noise", asked.noise.to_string(), "a number from 0 to 1");
+    if !(study.noise >= 0.0 && study.noise <= 1.0) {
+        return fail("noise", study.noise.to_string(), "a number from 0 to 1");
     }
-    if let Some(unknown) = asked.only.iter().find(|name| FAULTS.iter().all(|fault| fault.name != **name)) {
+    if let Some(unknown) = study.only.iter().find(|name| FAULTS.iter().all(|fault| fault.name != **name)) {
         return fail("fault", format!("{unknown:?}"), "the name of a fault, as the table has it");
     }
-    let wanted = |fault: &&Fault| asked.only.is_empty() || asked.only.iter().any(|name| name == fault.name);
+    let wanted = |fault: &&Fault| study.only.is_empty() || study.only.iter().any(|name| name == fault.name);
     Ok(FAULTS.iter().filter(wanted).collect())
 }
 
 /// The presses of a scene.
-pub(super) fn presses(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Press>, StudyError> {
-    let draws = Draws::new(scene, DrawOptions { seed: asked.seed, ..DrawOptions::default() })?;
+pub(super) fn presses(scene: &Scene, study: &SensorFaults) -> Result<Vec<Press>, StudyError> {
+    let draws = Draws::new(scene, DrawOptions { seed: study.seed, ..DrawOptions::default() })?;
     let press = |number: u64| -> Result<Press, GeneratorError> {
         let (own, other) = (draws.frame(number)?, draws.frame(number + 1)?);
         let peak_MPa = own.exact_MPa.iter().fold(0.0f64, |peak, b| b.max(peak));
         let peak_taxel = own.exact_MPa.iter().position(|b| *b == peak_MPa).unwrap_or(0);
-        let seed = asked.seed.wrapping_mul(SPREAD) ^ number;
+        let seed = study.seed.wrapping_mul(SPREAD) ^ number;
         let (exact_MPa, other_MPa, total_N) = (own.exact_MPa, other.exact_MPa, own.total_N);
         Ok(Press { exact_MPa, other_MPa, total_N, peak_MPa, peak_taxel, seed })
     };
-    Ok((0..asked.frames as u64).map(press).collect::<Result<_, _>>()?)
+    Ok((0..study.frames as u64).map(press).collect::<Result<_, _>>()?)
 }

@@ -384,18 +384,18 @@ impl<'k> Kept<'k> {
 
 impl Block for ForceUnit {
     fn build<'k>(&self, k: &'k Builder, io: ForceUnitPorts<Inside<'k>>) {
-        let (part_bits, bit, asked) = (io.part.bits(), Type::unsigned(1), STEPS - 1);
+        let (part_bits, bit, steps) = (io.part.bits(), Type::unsigned(1), STEPS - 1);
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
-        let offers = k.state("offers", Type::unsigned(asked), io.rst, 0);
-        offers.set(offers.low(asked - 1).concat(io.offer));
+        let offers = k.state("offers", Type::unsigned(steps), io.rst, 0);
+        offers.set(offers.low(steps - 1).concat(io.offer));
         let leaves = k.wire("leaves", offers.top());
-        let beats = travel(k, "beats", io.beat, asked);
+        let beats = travel(k, "beats", io.beat, steps);
         let lanes = travel(k, "lanes", io.lane, READ_STEPS);
-        let parts = travel(k, "parts", io.beat_part, asked);
+        let parts = travel(k, "parts", io.beat_part, steps);
         let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
-        let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
+        let beat_out = k.wire("beat_out", beats.slice(2 * (steps - 1), 2));
         let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
-        let at_out = k.wire("at_out", part_after(asked));
+        let at_out = k.wire("at_out", part_after(steps));
         let kept = Kept::new(k, &io, largest(&self.counts), at_out);
 
         let shift = self.shift(&io, &kept, part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS));
@@ -437,7 +437,7 @@ impl Block for ForceUnit {
         let status = self.status(&io, &kept, beat_out, [flags, *cycles_held, *force_saturations]);
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
         let words = beat_out.is(0).mux(force, status);
-        let steps = asked - READ_STEPS;
+        let steps = steps - READ_STEPS;
         let sent = self.tells_labels.then(|| travel(k, "labels_sent", label, steps));
         let sent = sent.map(|sent| sent.slice(self.label_bits * (steps - 1), self.label_bits));
         io.beat_data.delay(sent.map_or(words, |label| label.concat(words)));

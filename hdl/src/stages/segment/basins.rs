@@ -23,7 +23,7 @@ const OTHER: u64 = 3;
 const BEST: u64 = 5;
 const MERGED: u64 = 6;
 /// Tick of `LEAST` in which the last load has been compared.
-const TOLD: u64 = 3;
+const COMPARED: u64 = 3;
 
 /// Registers of the tables alone.
 pub(super) struct List<'k> {
@@ -54,7 +54,7 @@ pub(super) struct List<'k> {
 impl<'k> Circuit<'k> {
     /// The pairs of a basin with a small load begin with their saddles.
     pub(super) fn begin_pairs(&self, list: &List<'k>) {
-        self.begin(self.at(LEAST, TOLD) & !*list.ranks & *list.found, FIRST);
+        self.begin(self.at(LEAST, COMPARED) & !*list.ranks & *list.found, FIRST);
     }
 
     /// Every number of a basin is in the list.
@@ -101,7 +101,7 @@ impl<'k> Circuit<'k> {
         let meets = k.wire("meets", differs & stall.is(0));
 
         let (other_tick, merged) = (self.at(JOIN, OTHER), self.at(JOIN, MERGED));
-        let (told, starts) = (self.at(LEAST, TOLD), self.at(JOIN, 2));
+        let (compared, starts) = (self.at(LEAST, COMPARED), self.at(JOIN, 2));
         let pairs = meets | self.at(PAIRS, HIGHER) | self.at(PAIRS, SADDLE) | other_tick | merged;
         let diagonal = k.wire("diagonal", self.lower.equals(*self.higher));
         let (clears, climbs) = (self.is(CLEAR), self.is(CLIMB));
@@ -113,17 +113,17 @@ impl<'k> Circuit<'k> {
             (clears & !diagonal, self.lower.plus(1)),
         ]);
         // The list begins with 0, so do the counters of the steps that follow.
-        k.when(pairs | clears | told | starts | climbs, || self.lower.set(lower));
+        k.when(pairs | clears | compared | starts | climbs, || self.lower.set(lower));
         let counts = self.among(&[CLEAR, SETTLE]);
         let higher = select(&[
             (self.is(BORDERS), basin),
             (self.is(PAIRS) | merged, list.next),
             (other_tick, *self.cursor),
-            (told & !*list.ranks | starts, *list.gone),
+            (compared & !*list.ranks | starts, *list.gone),
             (counts, self.higher.plus(1)),
         ]);
         let counted = clears & diagonal | self.at(SETTLE, 1);
-        k.when(pairs | counted | told | starts | climbs, || self.higher.set(higher));
+        k.when(pairs | counted | compared | starts | climbs, || self.higher.set(higher));
 
         let turned = k.wire("turned", self.higher.less(*self.lower));
         let lower = k.wire("lower_ordered", turned.mux(*self.higher, *self.lower));
@@ -240,10 +240,10 @@ impl<'k> Circuit<'k> {
         k.when(scans, || {
             tick.set(zero(3).concat(!list.follows.any()));
         });
-        let told = self.at(LEAST, TOLD);
-        self.enter(told & ranks & found, [LEAST, TAKE], || ());
-        self.enter(told & ranks & !found, [LEAST, SETTLE], || ());
-        self.enter(told & !ranks, [LEAST, PAIRS], || {
+        let compared = self.at(LEAST, COMPARED);
+        self.enter(compared & ranks & found, [LEAST, TAKE], || ());
+        self.enter(compared & ranks & !found, [LEAST, SETTLE], || ());
+        self.enter(compared & !ranks, [LEAST, PAIRS], || {
             list.small.set(found);
             list.found.set(zero(1));
             list.outer.set(*list.gone);
@@ -282,7 +282,7 @@ impl<'k> Circuit<'k> {
         let others = self.at(PAIRS, HIGHER) | saddle;
         let follows = scans | self.at(SETTLE, 0) & !self.chain_out.top();
         let nexts = self.at(PAIRS, LOWER) | others | merged;
-        let gone = told & ranks & found | judges & found;
+        let gone = compared & ranks & found | judges & found;
         let zeros = joins | judges & !found | self.at(JOIN, 2) | self.at(TAKE, 1);
         let (into, settles, labels) = (self.at(JOIN, 0), self.at(SETTLE, 1), self.is(LABEL));
         // The next one is 0 at the end of the list.

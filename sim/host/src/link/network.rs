@@ -145,7 +145,7 @@ impl NetworkClient {
     }
 
     /// Asks what the core is, and for the counters of its array.
-    fn ask(&mut self) -> Result<(CoreIdentity, [i64; 2]), HostError> {
+    fn request_identity(&mut self) -> Result<(CoreIdentity, [i64; 2]), HostError> {
         let own = |answer, wanted| match answer {
             CoreAnswer::Identity { sequence, identity } if sequence == wanted => Some(identity),
             _ => None,
@@ -186,7 +186,7 @@ impl Board for NetworkClient {
                 self.failed(&"hardware.source = adc-scan: a core behind Ethernet takes frames and scans no array")
             );
         }
-        let (core, _) = self.ask()?;
+        let (core, _) = self.request_identity()?;
         check(model, &core).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })?;
         match (core.word("arrays") as usize, self.array) {
             (arrays, None) if arrays > 1 => {
@@ -204,7 +204,7 @@ impl Board for NetworkClient {
         self.fragment_words = (core.word("fragment_words") as usize).clamp(1, LAYOUT.fragment_words);
         self.short_forces = core.word("force_bits") == SHORT_BITS;
         for _ in 0..QUESTIONS {
-            let (core, [sent_ns, answered_ns]) = self.ask()?;
+            let (core, [sent_ns, answered_ns]) = self.request_identity()?;
             self.clock.add(sent_ns, core.cycles(), answered_ns);
         }
         let sensor = &model.scene.sensor;
@@ -228,7 +228,7 @@ impl Board for NetworkClient {
     }
 
     fn counters(&mut self) -> Result<PacketCounters, HostError> {
-        let (core, [sent_ns, answered_ns]) = self.ask()?;
+        let (core, [sent_ns, answered_ns]) = self.request_identity()?;
         self.clock.add(sent_ns, core.cycles(), answered_ns);
         let dropped = ["ignored", "refused", "damaged", "overrun", "cut"].map(|name| (name, core.word(name))).to_vec();
         Ok(PacketCounters { taken: core.word("taken"), dropped, bits: u32::BITS })
