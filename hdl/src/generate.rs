@@ -329,7 +329,7 @@ fn manifest(
             "mean": model.prepare.mean.name(),
             "full_scale_readings": full_scale.map(|full_scale| full_scale * model.prepare.reading_per_MPa),
             "full_scale_MPa": full_scale,
-            "noise_floor_codes": model.of_each_array(|own| own.noise_floor.into()),
+            "noise_floor_codes": model.of_each_array(|array| array.noise_floor.into()),
         },
         "output": {
             "force_beats": model.force_beats(),
@@ -338,7 +338,7 @@ fn manifest(
             // Without a full scale, a force LSB is this many N per MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
-            "threshold_lsb": model.of_each_array(|own| own.threshold.into()),
+            "threshold_lsb": model.of_each_array(|array| array.threshold.into()),
             "flags": status_masks(model),
             "status": status_layout(model),
         },
@@ -352,7 +352,7 @@ fn manifest(
         "resources": resources(usage, memories),
         "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),
         "frame_interval": frame_interval(model, model.first()),
-        "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),
+        "cases": model.chooses().then(|| model.cases().iter().map(|plan| case(model, plan)).collect::<Vec<_>>()),
         "dropped": model.chooses().then_some(dropped),
     })
 }

@@ -49,18 +49,18 @@ impl Tracks {
         self.all.retain(|track| now - track.found <= GAP);
         let found = result.all_contacts();
         let placed: Vec<(&FoundContact, [f64; 2])> =
-            found.iter().filter_map(|own| Some((own, own.centre_mm?))).collect();
+            found.iter().filter_map(|contact| Some((contact, contact.centre_mm?))).collect();
         let away = |track: &Track, [x, y]: [f64; 2]| (track.shown.centre_mm[0] - x).hypot(track.shown.centre_mm[1] - y);
         let mut pairs: Vec<(f64, usize, usize)> = (0..self.all.len())
-            .flat_map(|track| (0..placed.len()).map(move |own| (track, own)))
-            .map(|(track, own)| (away(&self.all[track], placed[own].1), track, own))
+            .flat_map(|track| (0..placed.len()).map(move |contact| (track, contact)))
+            .map(|(track, contact)| (away(&self.all[track], placed[contact].1), track, contact))
             .filter(|(away_mm, ..)| *away_mm <= reach_mm)
             .collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut of_contact: Vec<Option<usize>> = vec![None; placed.len()];
-        for (_, track, own) in pairs {
-            if of_contact[own].is_none() && !of_contact.contains(&Some(track)) {
-                of_contact[own] = Some(track);
+        for (_, track, contact) in pairs {
+            if of_contact[contact].is_none() && !of_contact.contains(&Some(track)) {
+                of_contact[contact] = Some(track);
             }
         }
         let moving = result.extra.template.map(|template| !template.held);

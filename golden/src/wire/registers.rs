@@ -228,11 +228,11 @@ pub fn c_header() -> String {
         let _ = writeln!(text, "/* {}; {} */", register.meaning, register.access.name());
         let _ = writeln!(text, "#define DERMIS_{name}_OFFSET 0x{:02x}u", register.address);
         for field in register.fields {
-            let own = format!("DERMIS_{name}_{}", field.name.to_uppercase());
+            let prefix = format!("DERMIS_{name}_{}", field.name.to_uppercase());
             let mask = ((1_u64 << field.bits) - 1) << field.low;
             let _ = writeln!(
                 text,
-                "/* {} */\n#define {own}_SHIFT {}\n#define {own}_MASK 0x{mask:08x}u",
+                "/* {} */\n#define {prefix}_SHIFT {}\n#define {prefix}_MASK 0x{mask:08x}u",
                 field.meaning, field.low
             );
         }
@@ -244,11 +244,11 @@ pub fn c_header() -> String {
     );
     let _ = writeln!(text, "#define DERMIS_STATUS_WORDS {}u", 3 * STATUS_BEATS);
     for field in status_fields() {
-        let own = format!("DERMIS_STATUS_{}", field.name.to_uppercase());
+        let prefix = format!("DERMIS_STATUS_{}", field.name.to_uppercase());
         let (meaning, word, shift, mask) = (field.meaning, field.index(), field.low, field.mask());
         let _ = writeln!(
             text,
-            "/* {meaning} */\n#define {own}_WORD {word}\n#define {own}_SHIFT {shift}\n#define {own}_MASK 0x{mask:08x}u"
+            "/* {meaning} */\n#define {prefix}_WORD {word}\n#define {prefix}_SHIFT {shift}\n#define {prefix}_MASK 0x{mask:08x}u"
         );
     }
     text + "\n#endif\n"

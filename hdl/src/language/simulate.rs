@@ -184,17 +184,17 @@ impl Simulation {
     /// An edge of one domain; says whether anything changed.
     fn edge(&mut self, domain: Option<usize>) -> bool {
         let Simulation { program, slots, memories, transitions, staged, writes, .. } = self;
-        let own = |transition: &&Transition| transition.domain == domain;
+        let in_domain = |transition: &&Transition| transition.domain == domain;
         run(&program.edge, &program.wide, slots, memories);
         let mut at = 0;
-        for transition in transitions.iter().filter(own) {
-            let own = &mut staged[at..][..transition.limbs];
+        for transition in transitions.iter().filter(in_domain) {
+            let target = &mut staged[at..][..transition.limbs];
             match transition.reset {
                 Some((condition, value)) if slots[condition] != 0 => {
-                    own.fill(0);
-                    own[0] = value;
+                    target.fill(0);
+                    target[0] = value;
                 }
-                _ => own.copy_from_slice(&slots[transition.next..][..transition.limbs]),
+                _ => target.copy_from_slice(&slots[transition.next..][..transition.limbs]),
             }
             let taken = |collision: &&Collision| collision.enable.is_none_or(|enable| slots[enable] != 0);
             if let Some(&Collision { memory, address, bits, .. }) = transition.collides.as_ref().filter(taken) {
@@ -202,7 +202,7 @@ impl Simulation {
                     write.memory == memory && slots[write.enable] != 0 && slots[write.address] == slots[address]
                 };
                 if writes.iter().any(written) {
-                    own.iter_mut().enumerate().for_each(|(limb, value)| *value ^= mask((bits - 64 * limb).min(64)));
+                    target.iter_mut().enumerate().for_each(|(limb, value)| *value ^= mask((bits - 64 * limb).min(64)));
                 }
             }
             at += transition.limbs;
@@ -220,11 +220,11 @@ impl Simulation {
             }
         }
         let mut at = 0;
-        for transition in transitions.iter().filter(own) {
-            let own = &mut slots[transition.to..][..transition.limbs];
+        for transition in transitions.iter().filter(in_domain) {
+            let target = &mut slots[transition.to..][..transition.limbs];
             let next = &staged[at..][..transition.limbs];
-            if own != next {
-                own.copy_from_slice(next);
+            if target != next {
+                target.copy_from_slice(next);
                 changed = true;
             }
             at += transition.limbs;

@@ -79,7 +79,7 @@ impl Block for ScanCapture {
 
         let waiting = k.state("waiting", Type::unsigned(count_bits(count + 1)), io.rst, 0).comment("Codes that wait.");
         let is_last = k.register("is_last", bit);
-        let held: Vec<_> = (0..count).map(|own| k.register(&format!("held_{own}"), Type::unsigned(code))).collect();
+        let held: Vec<_> = (0..count).map(|pin| k.register(&format!("held_{pin}"), Type::unsigned(code))).collect();
         let offered = io.m_axis.valid.set(waiting.any());
         let moves = k.wire("moves", offered & io.m_axis.ready);
         k.when(moves, || {
@@ -87,10 +87,10 @@ impl Block for ScanCapture {
             held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
         });
         let (mut at_end, mut at_other) = (Vec::new(), Vec::new());
-        for (own, to) in held.iter().enumerate() {
-            let name = |of: &str| format!("{of}_{own}");
+        for (pin, to) in held.iter().enumerate() {
+            let name = |of: &str| format!("{of}_{pin}");
             let answer = k.register(&name("answer"), Type::unsigned(bits + tag_bits));
-            k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(own))));
+            k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(pin))));
             let raw = answer.low(bits);
             let value = match converter.bipolar {
                 // Less the middle of the range.
@@ -120,10 +120,10 @@ impl Block for ScanCapture {
             let mean = sum.shift_left(shift).round_shift(power).low(code);
             let [top, bottom] =
                 [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
-            let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
-            k.when(*closing, || to.set(own_code));
-            at_end.push((high | low) & io.alive.at(own));
-            at_other.push(wrong & io.alive.at(own));
+            let code_out = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
+            k.when(*closing, || to.set(code_out));
+            at_end.push((high | low) & io.alive.at(pin));
+            at_other.push(wrong & io.alive.at(pin));
         }
         k.when(*closing, || {
             waiting.set(k.constant(waiting.bits(), count as u64));

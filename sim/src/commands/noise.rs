@@ -233,24 +233,24 @@ fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<Str
 }
 
 fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[ContactShape], format: Format) -> Result<String> {
-    let own = &arguments.shapes;
+    let shape_arguments = &arguments.shapes;
     let converter = Converter {
-        gain_spread: own.gain_spread,
-        drift: own.drift,
-        tare_frames: own.tare_frames,
+        gain_spread: shape_arguments.gain_spread,
+        drift: shape_arguments.drift,
+        tare_frames: shape_arguments.tare_frames,
         frames: arguments.frames.unwrap_or(1),
-        unipolar: own.unipolar || scene.input.unipolar,
+        unipolar: shape_arguments.unipolar || scene.input.unipolar,
         ..Default::default()
     };
     let options = DrawOptions {
         shapes: shapes.to_vec(),
-        contacts: own.contacts,
-        slip: own.slip,
+        contacts: shape_arguments.contacts,
+        slip: shape_arguments.slip,
         seed: arguments.seed,
         converter,
         ..Default::default()
     };
-    let (draws, noise_stated, by_shape) = (arguments.draws, !own.unstated, own.coverage);
+    let (draws, noise_stated, by_shape) = (arguments.draws, !shape_arguments.unstated, shape_arguments.coverage);
     let candidates = candidates(arguments);
     let mut wanted = ShapeStudy { draws, options, noise_stated, candidates, by_shape, ..Default::default() };
     if !arguments.levels.is_empty() {
@@ -258,16 +258,16 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[ContactShape], fo
     }
     let bar = Progress::steps(&format!("{}: noise, any shape", scene.name), 0);
     let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
-    if own.sensitivity {
+    if shape_arguments.sensitivity {
         let level = arguments.levels.first().copied().unwrap_or(SENSITIVITY_LEVEL);
         let wanted = ShapeStudy { levels: vec![level], ..wanted };
         return report::sensitivity(&sensitivities(scene, &wanted, &progress)?, level, format);
     }
-    if own.slips {
+    if shape_arguments.slips {
         return report::slips(&slip_study(scene, &wanted, &progress)?, format);
     }
     let rows = shape_study(scene, &wanted, &progress)?;
-    match (arguments.medians, own.coverage, format) {
+    match (arguments.medians, shape_arguments.coverage, format) {
         (true, _, _) => Ok(report::shape_medians(&rows)),
         (false, true, Format::Markdown) => Ok(report::coverage(&rows)),
         _ => report::shapes(&rows, format),

@@ -294,16 +294,16 @@ impl<'s> Table<'s> {
                 "{got} values, wanted {wanted}; a decimal mark is a point where commas separate values"
             ));
         }
-        let own = got - usize::from(self.trailing);
+        let count = got - usize::from(self.trailing);
         match stated.form {
-            Some(form) if own >= of(form).1 || got == of(form).1 => Ok(of(form)),
-            None if got == taxels || own >= taxels => Ok(of(Form::Line)),
-            None if got == cols || own == cols => Ok(of(Form::Grid)),
-            Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
+            Some(form) if count >= of(form).1 || got == of(form).1 => Ok(of(form)),
+            None if got == taxels || count >= taxels => Ok(of(Form::Line)),
+            None if got == cols || count == cols => Ok(of(Form::Grid)),
+            Some(form) => Err(format!("{count} values, wanted {}", of(form).1)),
             None => {
-                let numbered = own > cols && self.numbers_rows(rows);
+                let numbered = count > cols && self.numbers_rows(rows);
                 let hint = if numbered { "; --columns A..B says which are the readings of a row" } else { "" };
-                Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
+                Err(format!("{count} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
             }
         }
     }

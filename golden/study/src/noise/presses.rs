@@ -186,28 +186,28 @@ pub fn press_study(
     for &noise in &study.levels {
         let drawn = draw(scene, study, noise)?;
         let bounds = study.motions.iter().map(|motion| {
-            let own: Vec<&Drawn> = drawn.iter().filter(|own| own.motion == *motion).collect();
-            bound(scene, &own, study.press.draw.converter.gain_spread)
+            let presses: Vec<&Drawn> = drawn.iter().filter(|press| press.motion == *motion).collect();
+            bound(scene, &presses, study.press.draw.converter.gain_spread)
         });
         let bounds = bounds.collect::<Result<Vec<_>, _>>()?;
-        for (&own, &mean) in study.engines.iter().flat_map(|own| study.means.iter().map(move |mean| (own, mean))) {
+        for (&kind, &mean) in study.engines.iter().flat_map(|kind| study.means.iter().map(move |mean| (kind, mean))) {
             let mut stated = mean.stated(scene);
-            stated.input.template &= own != PressEngine::Fixed;
-            let engine: Box<dyn Engine + Send + Sync> = match own {
-                PressEngine::Golden(kind) => Box::new(Golden::with(&stated, kind)?),
+            stated.input.template &= kind != PressEngine::Fixed;
+            let engine: Box<dyn Engine + Send + Sync> = match kind {
+                PressEngine::Golden(estimator) => Box::new(Golden::with(&stated, estimator)?),
                 PressEngine::Fixed => Box::new(Model::for_frames(&stated, &largest(&drawn))?),
             };
-            let follow = |own: &Drawn| -> Result<Followed, StudyError> {
-                let followed = follow(&*engine, own, study.press.rate_Hz)?;
+            let follow = |press: &Drawn| -> Result<Followed, StudyError> {
+                let followed = follow(&*engine, press, study.press.rate_Hz)?;
                 step();
                 Ok(followed)
             };
             let all = drawn.par_iter().map(follow).collect::<Result<Vec<Followed>, _>>()?;
-            let estimator = match own {
-                PressEngine::Golden(kind) => kind.name().to_string(),
+            let estimator = match kind {
+                PressEngine::Golden(estimator) => estimator.name().to_string(),
                 PressEngine::Fixed => "hardware".to_string(),
             };
-            let row = |motion: &'static str, own: &[&Followed], bound| {
+            let row = |motion: &'static str, followed: &[&Followed], bound| {
                 let named = PressRow {
                     noise,
                     estimator: estimator.clone(),
@@ -216,11 +216,11 @@ pub fn press_study(
                     bound,
                     ..Default::default()
                 };
-                named.with_figures(own)
+                named.with_figures(followed)
             };
             for (motion, bound) in std::iter::zip(&study.motions, &bounds) {
                 let of_motion = drawn.iter().zip(&all).filter(|(drawn, _)| drawn.motion == *motion);
-                rows.push(row(motion.name(), &of_motion.map(|(_, own)| own).collect::<Vec<_>>(), *bound));
+                rows.push(row(motion.name(), &of_motion.map(|(_, followed)| followed).collect::<Vec<_>>(), *bound));
             }
             if study.motions.len() > 1 {
                 rows.push(row("all", &all.iter().collect::<Vec<_>>(), None));

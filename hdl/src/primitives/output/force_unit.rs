@@ -432,7 +432,7 @@ impl Block for ForceUnit {
         let count = k.wire("count", count);
         k.comment("What a force adds to the sum of all is registered beside the result of the threshold.");
         let balance =
-            self.balance.map(|own| (own, k.register("balance", own.ty()), k.delay("weighed", own.weighed(z.word))));
+            self.balance.map(|rule| (rule, k.register("balance", rule.ty()), k.delay("weighed", rule.weighed(z.word))));
         let flags = self.flags(&io, &kept, *contact, balance.as_ref().map(|(_, sum, _)| **sum));
         let status = self.status(&io, &kept, beat_out, [flags, *cycles_held, *force_saturations]);
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
@@ -456,14 +456,14 @@ impl Block for ForceUnit {
                 force_saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
                 k.when(below.map_or(presses, |below| presses & !below), || {
                     contact.set(one);
-                    balance.iter().for_each(|(own, sum, weighed)| sum.set(own.sum(**sum, *weighed)));
+                    balance.iter().for_each(|(rule, sum, weighed)| sum.set(rule.sum(**sum, *weighed)));
                 });
             });
         });
         k.when(io.begin_frame, || {
             counting.set(one);
             contact.set(zero);
-            balance.iter().for_each(|(own, sum, _)| sum.set(k.signed_constant(own.ty().bits, 0)));
+            balance.iter().for_each(|(rule, sum, _)| sum.set(k.signed_constant(rule.ty().bits, 0)));
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
     }

@@ -57,16 +57,16 @@ impl Block for OperandWriter {
         let quad = k.state("quad", Type::unsigned(count_bits(longest)), io.clear, 0);
         let address = io.address.state(io.clear, 0);
         let finished = io.finished.state(io.clear, 0);
-        let is_uniform = |own: &Vec<usize>| own.iter().all(|length| *length == own[0]);
-        let last = if lengths.iter().all(|own| own.len() == vectors && is_uniform(own)) {
-            let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
+        let is_uniform = |lengths: &Vec<usize>| lengths.iter().all(|length| *length == lengths[0]);
+        let last = if lengths.iter().all(|lengths| lengths.len() == vectors && is_uniform(lengths)) {
+            let ends: Vec<usize> = lengths.iter().map(|lengths| lengths[0] - 1).collect();
             value_by_case(k, io.which, &ends, quad.bits())
         } else {
-            let own = |own: &Vec<usize>| {
-                let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
+            let last_quads = |lengths: &Vec<usize>| {
+                let lasts: Vec<u64> = lengths.iter().map(|length| *length as u64 - 1).collect();
                 finished.table(quad.bits(), &padded(lasts, finished.bits()))
             };
-            let of_cases: Vec<Expr> = lengths.iter().map(own).collect();
+            let of_cases: Vec<Expr> = lengths.iter().map(last_quads).collect();
             expression_by_case(io.which, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
         };
         let last_quad = k.wire("last_quad", quad.equals(last));

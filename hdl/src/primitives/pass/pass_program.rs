@@ -47,23 +47,23 @@ pub fn programs(model: &Model) -> Vec<(&CasePlan, Section)> {
 
 /// The steps of a section: its [instructions](dermis_golden::fixed::plan::program).
 fn unroll((case, section): &(&CasePlan, Section)) -> Vec<Step> {
-    let step = |own: Instruction| Step {
-        coefficients: own.coefficients,
-        columns: own.columns,
-        operand: own.operand,
-        kind: match own.product.operand {
+    let step = |instruction: Instruction| Step {
+        coefficients: instruction.coefficients,
+        columns: instruction.columns,
+        operand: instruction.operand,
+        kind: match instruction.product.operand {
             Operand::InputHigh => 1,
             Operand::InputLow => 2,
             Operand::One => 3,
             _ => 0,
         },
-        flip: own.product.matrix.flip as u64,
-        transposed: own.product.transposed,
-        factor: own.product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
-        layer: matches!(own.target, Target::Layer(_)),
-        last: own.last,
+        flip: instruction.product.matrix.flip as u64,
+        transposed: instruction.product.transposed,
+        factor: instruction.product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
+        layer: matches!(instruction.target, Target::Layer(_)),
+        last: instruction.last,
         ends: false,
-        needs: own.needs,
+        needs: instruction.needs,
     };
     let mut steps: Vec<Step> = instructions(case, section).into_iter().map(step).collect();
     if let Some(step) = steps.last_mut() {
