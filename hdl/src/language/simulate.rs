@@ -89,33 +89,36 @@ impl Simulation {
         }
         let node = |id| program.operand(kernel, id).slot as usize;
         let mut transitions = Vec::new();
-        for (signal, of, register) in kernel.registers() {
-            let own = kernel.interned[&(Node::Signal(signal), of.ty)];
-            let sign = |value: u64| match of.ty.signed && of.ty.bits < 64 && value >> (of.ty.bits - 1) & 1 == 1 {
-                true => value | !mask(of.ty.bits),
+        for (signal, definition, register) in kernel.registers() {
+            let held = kernel.interned[&(Node::Signal(signal), definition.ty)];
+            let sign = |value: u64| match definition.ty.signed
+                && definition.ty.bits < 64
+                && value >> (definition.ty.bits - 1) & 1 == 1
+            {
+                true => value | !mask(definition.ty.bits),
                 false => value,
             };
-            let Some(next) = of.value else { continue };
-            slots[node(own)] = sign(register.initial.unwrap_or(0));
+            let Some(next) = definition.value else { continue };
+            slots[node(held)] = sign(register.initial.unwrap_or(0));
             let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
-            let limbs = limbs(of.ty.bits) as usize;
+            let limbs = limbs(definition.ty.bits) as usize;
             // A register with an enable takes the word or keeps its own.
             let (enable, taken) = match kernel.nodes[next].0 {
-                Node::Mux(enable, taken, kept) if kept == own => (Some(node(enable)), taken),
+                Node::Mux(enable, taken, kept) if kept == held => (Some(node(enable)), taken),
                 _ => (None, next),
             };
             let collides = match kernel.nodes[taken].0 {
                 Node::Read { memory, address } if kernel.memories[memory].unchecked => {
-                    Some(Collision { memory, address: node(address), bits: of.ty.bits, enable })
+                    Some(Collision { memory, address: node(address), bits: definition.ty.bits, enable })
                 }
                 _ => None,
             };
-            let (to, next, domain) = (node(own), node(next), register.domain);
+            let (to, next, domain) = (node(held), node(next), register.domain);
             transitions.push(Transition { to, next, limbs, reset, domain, collides });
         }
         let mut writes = Vec::new();
-        for (memory, of) in kernel.memories.iter().enumerate() {
-            writes.extend(of.writes.iter().map(|write| WritePort {
+        for (memory, definition) in kernel.memories.iter().enumerate() {
+            writes.extend(definition.writes.iter().map(|write| WritePort {
                 memory,
                 enable: node(write.enable),
                 address: node(write.address),
