@@ -59,15 +59,15 @@ impl Fit<'_> {
     /// The standard deviation that the baseline adds to each μ: the network knows of none.
     fn by_baseline(&self, found: &Found) -> Option<Vec<f64>> {
         let Found { regions, top, covariance } = found;
-        let (design, kept) = (&regions.design, regions.design.of_baseline().start);
+        let (design, baseline_start) = (&regions.design, regions.design.of_baseline().start);
         let without = Design {
-            s: design.s.subcols(0, kept).to_owned(),
-            contact: design.contact[..kept].to_vec(),
+            s: design.s.subcols(0, baseline_start).to_owned(),
+            contact: design.contact[..baseline_start].to_vec(),
             baseline: 0,
-            spread: design.spread.subcols(0, kept).to_owned(),
+            spread: design.spread.subcols(0, baseline_start).to_owned(),
         };
         let mut readings = self.readings.clone();
-        let stress = top.posterior.stress_of(|i| i >= kept);
+        let stress = top.posterior.stress_of(|i| i >= baseline_start);
         readings.y.iter_mut().zip(stress).for_each(|(y, stress)| *y -= stress);
         let slope = without.slope(&readings, &without.posterior(&readings, &top.mu)?);
         let known = self.scene.prior.covariance(&slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
