@@ -82,7 +82,7 @@ block! {
         /// Synchronous reset, active high; clears the control pipeline only.
         in rst;
         /// Index of the case of the frame being sent; constant from its first `offer` to its last beat.
-        in which: count_bits(counts.len());
+        in case_index: count_bits(counts.len());
         /// A new frame: clears its counts, the contact flag and the saturations.
         in begin_frame;
         /// Stores position, exponents and status of subarray `part` in this cycle.
@@ -291,7 +291,7 @@ impl ForceUnit {
         let above_case = (FRAMES.low - CASE.low - CASE.bits) as usize;
         all.splice(
             above_case..above_case + CASE.bits as usize,
-            [value_by_case(k, io.which, &self.numbers, CASE.bits as usize)],
+            [value_by_case(k, io.case_index, &self.numbers, CASE.bits as usize)],
         );
         let frames = marks.filter(|_| frames_bits > 0).map_or(k.constant(1, 0), |marks| marks.low(frames_bits));
         concat(&[vec![frames.extend(WORD - FRAMES.low as usize)], all].concat())
@@ -445,7 +445,7 @@ impl Block for ForceUnit {
         valid.set(leaves);
         let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();
         let last = io.last.state(io.rst, 0);
-        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(k, io.which, &ends, part_bits)));
+        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(k, io.case_index, &ends, part_bits)));
 
         let (zero, one) = (k.constant(1, 0), k.constant(1, 1));
         k.when(leaves, || {
