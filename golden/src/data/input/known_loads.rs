@@ -410,12 +410,12 @@ mod tests {
                         let dead = fit.dead.contains(&[k / 8, k % 8]);
                         !dead && (sign * fit.table.gain[*k] / truth(*k).1 - 1.0).abs() > 0.03
                     };
-                    let told = !fit.saturated_MPa.is_empty()
+                    let reported = !fit.saturated_MPa.is_empty()
                         || fit.curved_share().is_some()
                         || fit.curvature.is_some()
                         || !fit.dead.is_empty();
                     match (0..64).find(wrong) {
-                        Some(k) if !told => silent.push((end, every, sign, k)),
+                        Some(k) if !reported => silent.push((end, every, sign, k)),
                         Some(_) => said += 1,
                         None => {}
                     }

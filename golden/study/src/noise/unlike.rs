@@ -77,8 +77,8 @@ pub struct UnlikeRow {
     pub estimator: String,
     /// Number of frames.
     pub frames: usize,
-    /// Median of [`network_misfit`](dermis_golden::result::checks::Checks::network_misfit), the noise not stated; `None` if the network was
-    /// asked for none.
+    /// Median of [`network_misfit`](dermis_golden::result::checks::Checks::network_misfit), the noise not stated; `None` if the network
+    /// was evaluated for none.
     pub misfit: Option<f64>,
     /// Share of frames with the flag `misfit`.
     pub flagged: Interval,
@@ -244,7 +244,7 @@ fn logarithmic([low, high]: [f64; 2], random: &mut Random) -> f64 {
 }
 
 /// The limit of [`Misfit`] for the network that `scene` names: 99.8 % of `frames` frames as its training draws them are
-/// within it, their noise stated. `None` if the network was asked for none. The frames depend on `seed`.
+/// within it, their noise stated. `None` if the network was evaluated for none. The frames depend on `seed`.
 ///
 /// # Errors
 /// [`StudyError`]: a scene without such a network, or on which no contacts fit.

@@ -178,8 +178,8 @@ mod tests {
             period_us: 1000.0,
         };
         let array = Array::new(scan, 4, Vec::new(), 0.0, None);
-        let told = |fault: Fault| fault.check(&array, 2).map_err(|error| error.to_string());
-        assert_eq!(told(Fault::Flip { converter: 1, frame: 55, bit: 15 }), Ok(()));
+        let checked = |fault: Fault| fault.check(&array, 2).map_err(|error| error.to_string());
+        assert_eq!(checked(Fault::Flip { converter: 1, frame: 55, bit: 15 }), Ok(()));
         let cases = [
             (Fault::Stuck { converter: 2, level: true }, "--wire: converter 2 is not possible; it must be 0 to 1"),
             (Fault::Row { row: 4 }, "--wire: row 4 is not possible; it must be 0 to 3"),
@@ -193,7 +193,7 @@ mod tests {
             ),
         ];
         for (fault, message) in cases {
-            assert_eq!(told(fault), Err(message.to_owned()));
+            assert_eq!(checked(fault), Err(message.to_owned()));
         }
     }
 }

@@ -175,9 +175,9 @@ mod tests {
         (scene.sensor.rows, scene.sensor.cols) = (16, 16);
         scene.hardware.board = Some("colorlight-i5".into());
         let error = Model::new(&scene).unwrap_err().to_string();
-        let told = in_one_line(&error);
-        assert!(error.lines().count() > 1 && !told.contains('\n'), "{error}");
-        assert!(error.lines().all(|line| told.contains(line.trim())), "{told}");
+        let one_line = in_one_line(&error);
+        assert!(error.lines().count() > 1 && !one_line.contains('\n'), "{error}");
+        assert!(error.lines().all(|line| one_line.contains(line.trim())), "{one_line}");
         assert_eq!(in_one_line("one"), "one");
     }
 }
