@@ -169,16 +169,18 @@ impl Wrapper {
 /// # Errors
 /// [`HdlError::Check`] if one is missing, or not of its size.
 fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, HdlError> {
-    let all: Vec<(&str, &language::Memory)> =
-        hierarchy.kernels().flat_map(|(block, kernel)| kernel.memories().iter().map(move |own| (block, own))).collect();
+    let memories: Vec<(&str, &language::Memory)> = hierarchy
+        .kernels()
+        .flat_map(|(block, kernel)| kernel.memories().iter().map(move |memory| (block, memory)))
+        .collect();
     let place = |planned: &Memory| {
         let label = planned.holds.to_string();
-        let is = |own: &language::Memory| {
-            own.label.as_ref() == Some(&label) && (own.words, own.bits) == (planned.words, planned.bits)
+        let is = |memory: &language::Memory| {
+            memory.label.as_ref() == Some(&label) && (memory.words, memory.bits) == (planned.words, planned.bits)
         };
-        let found = all.iter().find(|(_, own)| is(own));
+        let found = memories.iter().find(|(_, memory)| is(memory));
         let missing = || HdlError::Check(format!("the model's memory {planned:?} is not in the hardware"));
-        found.map(|(block, own)| PlacedMemory::new(block, &own.name, planned)).ok_or_else(missing)
+        found.map(|(block, memory)| PlacedMemory::new(block, &memory.name, planned)).ok_or_else(missing)
     };
     model.resources.memories.iter().map(place).collect()
 }

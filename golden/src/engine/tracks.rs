@@ -95,24 +95,25 @@ impl Track {
     }
 
     fn next(&mut self, contact: &FoundContact, centre_mm: [f64; 2], moving: Option<bool>) {
-        let own = &mut self.shown;
-        own.age += 1;
-        for (velocity_mm, (now, before)) in own.velocity_mm.iter_mut().zip(std::iter::zip(centre_mm, own.centre_mm)) {
+        let shown = &mut self.shown;
+        shown.age += 1;
+        for (velocity_mm, (now, before)) in shown.velocity_mm.iter_mut().zip(std::iter::zip(centre_mm, shown.centre_mm))
+        {
             *velocity_mm += (now - before - *velocity_mm) / SMOOTH;
         }
-        own.centre_mm = centre_mm;
+        shown.centre_mm = centre_mm;
         let [x, y, normal] = contact.force_N;
-        own.load_ratio = if normal > 0.0 { x.hypot(y) / normal } else { 0.0 };
-        own.load_ratio_sigma = contact.mu_sigma.map(|[x, y]| x.hypot(y) / f64::sqrt(2.0));
-        let begins = own.moving == Some(false) && moving == Some(true) && own.age > GROWN;
+        shown.load_ratio = if normal > 0.0 { x.hypot(y) / normal } else { 0.0 };
+        shown.load_ratio_sigma = contact.mu_sigma.map(|[x, y]| x.hypot(y) / f64::sqrt(2.0));
+        let begins = shown.moving == Some(false) && moving == Some(true) && shown.age > GROWN;
         if begins {
-            (own.slip_ratio, self.largest) = (Some(self.largest), 0.0);
+            (shown.slip_ratio, self.largest) = (Some(self.largest), 0.0);
         }
         // While it moves, the ratio is that of kinetic friction.
         if moving == Some(false) {
-            self.largest = self.largest.max(own.load_ratio);
+            self.largest = self.largest.max(shown.load_ratio);
         }
-        own.moving = moving;
+        shown.moving = moving;
     }
 }
 

@@ -75,7 +75,7 @@ impl Block for ScanCore {
         let sequencer = k.instance("sequencer", ScanSequencer::new(&self.params));
         let capture = k.instance("capture", ScanCapture::new(&self.params));
         let engine = k.instance("engine", &self.engine);
-        let scan_status = k.instance("status", ScanStatus::new(self.forces));
+        let scan_status = k.instance("scan_status", ScanStatus::new(self.forces));
         k.comment("Registered, because the engine is large and its reset has a long route.");
         restart.d.set(io.rst);
         let restarts = [&sequencer.rst, &capture.rst, &engine.rst, &scan_status.rst];

@@ -208,21 +208,22 @@ fn candidates(arguments: &Arguments) -> Vec<Candidate> {
 
 /// The study over presses.
 fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<String> {
-    let own = &arguments.time;
+    let press_arguments = &arguments.time;
     let estimators = match arguments.shapes.estimators.as_slice() {
         [] => &[scene.model_estimator()],
         stated => stated,
     };
     let mut engines: Vec<PressEngine> = estimators.iter().copied().map(PressEngine::Golden).collect();
     engines.extend(arguments.shapes.hardware.then_some(PressEngine::Fixed));
-    let all = PressStudy::default();
-    let converter = Converter { gain_spread: own.gains, bits: Some(own.bits), ..Converter::default() };
-    let draw = DrawOptions { converter, seed: arguments.seed, ..all.press.draw };
-    let frames = (own.rate * own.seconds).round() as usize + 1;
-    let press = Press { rate_Hz: own.rate, frames, draw, ..all.press };
-    let mut wanted = PressStudy { engines, presses: own.presses, press, ..all };
-    if !own.motions.is_empty() {
-        wanted.motions = own.motions.clone();
+    let default = PressStudy::default();
+    let converter =
+        Converter { gain_spread: press_arguments.gains, bits: Some(press_arguments.bits), ..Converter::default() };
+    let draw = DrawOptions { converter, seed: arguments.seed, ..default.press.draw };
+    let frames = (press_arguments.rate * press_arguments.seconds).round() as usize + 1;
+    let press = Press { rate_Hz: press_arguments.rate, frames, draw, ..default.press };
+    let mut wanted = PressStudy { engines, presses: press_arguments.presses, press, ..default };
+    if !press_arguments.motions.is_empty() {
+        wanted.motions = press_arguments.motions.clone();
     }
     if !arguments.levels.is_empty() {
         wanted.levels = arguments.levels.clone();

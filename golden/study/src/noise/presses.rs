@@ -286,9 +286,9 @@ fn follow(engine: &dyn Engine, drawn: &Drawn, rate_Hz: f64) -> Result<Followed, 
 fn lag(found: &[[f64; 2]], truth: &[[f64; 2]], from: usize) -> Option<f64> {
     let begin = from.max(LONGEST_LAG);
     let count = truth.len().checked_sub(begin).filter(|count| *count > 1)? as f64;
-    let mean = [0, 1].map(|axis| truth[begin..].iter().map(|own| own[axis]).sum::<f64>() / count);
-    let away = |own: &[f64; 2], from: &[f64; 2]| (own[0] - from[0]).powi(2) + (own[1] - from[1]).powi(2);
-    let sum = |from: &[f64; 2]| truth[begin..].iter().map(|own| away(own, from)).sum::<f64>();
+    let mean = [0, 1].map(|axis| truth[begin..].iter().map(|force| force[axis]).sum::<f64>() / count);
+    let away = |force: &[f64; 2], from: &[f64; 2]| (force[0] - from[0]).powi(2) + (force[1] - from[1]).powi(2);
+    let sum = |from: &[f64; 2]| truth[begin..].iter().map(|force| away(force, from)).sum::<f64>();
     let changes = sum(&mean) > LEAST_CHANGE.powi(2) * sum(&[0.0; 2]);
     let apart = |shift: usize| (begin..truth.len()).map(|k| away(&found[k], &truth[k - shift])).sum::<f64>();
     let all: Vec<f64> = (0..=LONGEST_LAG).map(apart).collect();
@@ -301,13 +301,13 @@ fn bound(scene: &Scene, drawn: &[&Drawn], gain_spread: f64) -> Result<Option<[f6
     let kernels = Kernels::new(&scene.sensor, scene.medium);
     let mut errors = [Vec::new(), Vec::new()];
     let mut random = Random::new(1);
-    for own in drawn {
-        let middle = &own.frames[own.frames.len() / 2];
+    for press in drawn {
+        let middle = &press.frames[press.frames.len() / 2];
         let truth = middle.resultant_N.unwrap_or_default();
         let bound =
             SupportBound::new(&kernels, scene.sensor.thickness_mm, &middle.contacts, middle.stress_MPa.clone())?;
         for (errors, frames) in errors.iter_mut().zip([1.0, LONGEST_MEAN]) {
-            let noise_MPa = own.noise_MPa / f64::sqrt(frames);
+            let noise_MPa = press.noise_MPa / f64::sqrt(frames);
             let reading = Reading { noise_MPa, gain_spread, unipolar: scene.input.unipolar };
             let Some(covariance) = bound.covariance(reading) else { return Ok(None) };
             let shear = nalgebra::Matrix2::from_fn(|i, k| covariance[(i, k)]);
@@ -325,25 +325,25 @@ fn bound(scene: &Scene, drawn: &[&Drawn], gain_spread: f64) -> Result<Option<[f6
 
 impl PressRow {
     /// The row with the figures of some presses.
-    fn with_figures(self, all: &[&Followed]) -> PressRow {
+    fn with_figures(self, presses: &[&Followed]) -> PressRow {
         let sorted = |values: &mut dyn Iterator<Item = f64>| {
             let mut values: Vec<f64> = values.collect();
             values.sort_by(f64::total_cmp);
             values
         };
         let share = |of: &dyn Fn(&Followed) -> &Vec<bool>| {
-            let count = all.iter().map(|own| of(own).len()).sum::<usize>();
-            let trues = all.iter().flat_map(|own| of(own)).filter(|own| **own).count();
+            let count = presses.iter().map(|press| of(press).len()).sum::<usize>();
+            let trues = presses.iter().flat_map(|press| of(press)).filter(|is_true| **is_true).count();
             (count > 0).then(|| trues as f64 / count as f64)
         };
-        let errors = sorted(&mut all.iter().flat_map(|own| own.errors.iter().copied()));
-        let lags = sorted(&mut all.iter().filter_map(|own| own.lag_frames));
+        let errors = sorted(&mut presses.iter().flat_map(|press| press.errors.iter().copied()));
+        let lags = sorted(&mut presses.iter().filter_map(|press| press.lag_frames));
         PressRow {
             frames: errors.len(),
             tangential: [0.5, 0.9].map(|share| quantile(&errors, share)),
             lag_frames: (!lags.is_empty()).then(|| quantile(&lags, 0.5)),
-            held: share(&|own| &own.held),
-            within_1: share(&|own| &own.within),
+            held: share(&|press| &press.held),
+            within_1: share(&|press| &press.within),
             ..self
         }
     }

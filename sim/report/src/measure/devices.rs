@@ -119,19 +119,19 @@ pub struct Devices {
 pub fn devices(scenes: &[Scene], options: &DeviceOptions) -> Result<Devices> {
     let mut all = Devices::default();
     for scene in scenes {
-        let mut own = Devices::default();
+        let mut of_scene = Devices::default();
         let model = Model::new(scene)?;
         let frames = unrelated(scene)?;
-        on_cpu(&model, &frames, options, &mut own)?;
+        on_cpu(&model, &frames, options, &mut of_scene)?;
         let base =
-            own.rows.iter().find(|row| row.device == FLOAT && row.estimator == scene.hardware_estimator().name());
+            of_scene.rows.iter().find(|row| row.device == FLOAT && row.estimator == scene.hardware_estimator().name());
         if let Some(base) = base.map(|row| row.median_s) {
-            own.rows.iter_mut().for_each(|row| row.ratio = Some(row.median_s / base));
+            of_scene.rows.iter_mut().for_each(|row| row.ratio = Some(row.median_s / base));
         }
-        on_microcontrollers(&model, &frames[..COUNTED], &mut own)?;
-        on_fpga(&model, &frames[..COUNTED], options, &mut own)?;
-        all.rows.extend(own.rows);
-        all.notes.extend(own.notes);
+        on_microcontrollers(&model, &frames[..COUNTED], &mut of_scene)?;
+        on_fpga(&model, &frames[..COUNTED], options, &mut of_scene)?;
+        all.rows.extend(of_scene.rows);
+        all.notes.extend(of_scene.notes);
     }
     Ok(all)
 }
