@@ -41,7 +41,7 @@ pub(super) const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Shape of a drawn contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum ContactShape {
     /// Hertz's pressure on an ellipse.
     Hertz,
     /// Uniform pressure on an ellipse.
@@ -56,23 +56,24 @@ pub enum Shape {
     Asymmetric,
 }
 
-impl Shape {
+impl ContactShape {
     /// Every shape with its name in options and tables.
-    pub const NAMES: [(&'static str, Shape); 6] = [
-        ("hertz", Shape::Hertz),
-        ("punch", Shape::Punch),
-        ("ring", Shape::Ring),
-        ("rectangle", Shape::Rectangle),
-        ("tilted", Shape::Tilted),
-        ("asymmetric", Shape::Asymmetric),
+    pub const NAMES: [(&'static str, ContactShape); 6] = [
+        ("hertz", ContactShape::Hertz),
+        ("punch", ContactShape::Punch),
+        ("ring", ContactShape::Ring),
+        ("rectangle", ContactShape::Rectangle),
+        ("tilted", ContactShape::Tilted),
+        ("asymmetric", ContactShape::Asymmetric),
     ];
 
     /// The five shapes of the published tables, in equal shares: all but `asymmetric`.
-    pub const TABLE: [Shape; 5] = [Shape::Hertz, Shape::Punch, Shape::Ring, Shape::Rectangle, Shape::Tilted];
+    pub const TABLE: [ContactShape; 5] =
+        [ContactShape::Hertz, ContactShape::Punch, ContactShape::Ring, ContactShape::Rectangle, ContactShape::Tilted];
 
     /// The name in options and tables.
     pub fn name(self) -> &'static str {
-        Shape::NAMES.iter().find(|(_, shape)| *shape == self).map_or("", |(name, _)| *name)
+        ContactShape::NAMES.iter().find(|(_, shape)| *shape == self).map_or("", |(name, _)| *name)
     }
 
     /// Shape and sizes of a contact with the given half-axes, as [`crate::data::generator`] takes them.
@@ -80,16 +81,16 @@ impl Shape {
         let angle = random.between(0.0, 180.0);
         let long = a.max(b);
         match self {
-            Shape::Hertz => ("hertz-ellipse", vec![a, b, angle]),
-            Shape::Punch => ("flat-punch", vec![a, b, angle]),
-            Shape::Ring => ("ring", vec![long, random.between(0.3, 0.7) * long]),
+            ContactShape::Hertz => ("hertz-ellipse", vec![a, b, angle]),
+            ContactShape::Punch => ("flat-punch", vec![a, b, angle]),
+            ContactShape::Ring => ("ring", vec![long, random.between(0.3, 0.7) * long]),
             // The corners reach as far as the ellipse.
-            Shape::Rectangle => ("rectangle", vec![1.41 * a, 1.41 * b, angle]),
-            Shape::Tilted => {
+            ContactShape::Rectangle => ("rectangle", vec![1.41 * a, 1.41 * b, angle]),
+            ContactShape::Tilted => {
                 let (tilt, towards) = (random.between(0.3, 0.8), random.between(0.0, TAU));
                 ("tilted", vec![a, b, angle, tilt * towards.cos(), tilt * towards.sin()])
             }
-            Shape::Asymmetric => ("lobed", vec![a, b, angle]),
+            ContactShape::Asymmetric => ("lobed", vec![a, b, angle]),
         }
     }
 }
@@ -98,7 +99,7 @@ impl Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawOptions {
     /// The shapes, taken in turn; not empty.
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<ContactShape>,
     /// Number of contacts of a frame, 1 to 64; they do not overlap.
     pub contacts: usize,
     /// Smallest and largest normal load of a contact in N.
@@ -118,7 +119,7 @@ pub struct DrawOptions {
 impl Default for DrawOptions {
     fn default() -> Self {
         DrawOptions {
-            shapes: Shape::TABLE.to_vec(),
+            shapes: ContactShape::TABLE.to_vec(),
             contacts: 1,
             normal_N: [1.0, 12.0],
             ratio: [0.15, 0.5],
@@ -134,7 +135,7 @@ impl Default for DrawOptions {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactTruth {
     /// Its shape.
-    pub shape: Shape,
+    pub shape: ContactShape,
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],
     /// Force in N, [x, y, normal].
@@ -249,7 +250,7 @@ impl Draws {
         Err(GeneratorError::Option { field: "contacts", value: count as f64, allowed })
     }
 
-    fn shape(&self, number: u64, index: usize) -> Shape {
+    fn shape(&self, number: u64, index: usize) -> ContactShape {
         let shapes = &self.options.shapes;
         shapes[((number % shapes.len() as u64) as usize + index) % shapes.len()]
     }
@@ -295,8 +296,8 @@ mod tests {
         Draws::new(&Scene::builtin(scene).unwrap(), options).unwrap()
     }
 
-    fn all() -> Vec<Shape> {
-        Shape::NAMES.map(|(_, shape)| shape).to_vec()
+    fn all() -> Vec<ContactShape> {
+        ContactShape::NAMES.map(|(_, shape)| shape).to_vec()
     }
 
     #[test]
@@ -343,7 +344,7 @@ mod tests {
         // Two independent ways: quadrature of the kernel of a point force, and cells of 0.2 mm.
         let sensor = Sensor { rows: 80, cols: 80, pitch_x_mm: 0.2, pitch_y_mm: 0.2, thickness_mm: 3.0 };
         let fine = Scene { sensor: sensor.clone(), ..Scene::builtin("sensor-1").unwrap() };
-        for shape in [Shape::Tilted, Shape::Asymmetric] {
+        for shape in [ContactShape::Tilted, ContactShape::Asymmetric] {
             let draws = Draws::new(&fine, DrawOptions { shapes: vec![shape], ..Default::default() }).unwrap();
             let contacts = draws.contacts(5).unwrap();
             let drawn_pieces = pieces(0, &contacts[0]).unwrap();

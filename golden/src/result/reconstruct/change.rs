@@ -23,25 +23,25 @@ impl Reconstruction {
     /// Changes the forces, those of each contact by its own, in the order of [`Reconstruction::contacts`]; where no contacts are told
     /// apart there is one change, of the array as one subarray. `frame` has the known forces.
     pub(crate) fn change(&mut self, scene: &Scene, frame: &Frame, changes: &[ForceChange]) {
-        for own in changes {
+        for change in changes {
             let forces = &mut self.forces_N;
-            for (axis, change_N) in [&mut forces.fx, &mut forces.fy, &mut forces.fz].into_iter().zip(own.force_N) {
-                axis.iter_mut().zip(&own.shares).for_each(|(force, share)| *force += share * change_N);
+            for (axis, change_N) in [&mut forces.fx, &mut forces.fy, &mut forces.fz].into_iter().zip(change.force_N) {
+                axis.iter_mut().zip(&change.shares).for_each(|(force, share)| *force += share * change_N);
             }
         }
-        for (contact, own) in self.extra.contacts.iter_mut().flatten().zip(changes) {
-            contact.force_N = sum(contact.force_N, own.force_N);
-            contact.sigma_N = std::array::from_fn(|axis| changed(contact.sigma_N[axis], own.variance_N2[axis]));
+        for (contact, change) in self.extra.contacts.iter_mut().flatten().zip(changes) {
+            contact.force_N = sum(contact.force_N, change.force_N);
+            contact.sigma_N = std::array::from_fn(|axis| changed(contact.sigma_N[axis], change.variance_N2[axis]));
             contact.mu = ratio(contact.force_N);
             for (axis, covariance) in [(0, 0), (1, 2)] {
                 let variance = &mut contact.mu_covariance[covariance];
-                *variance = (*variance + own.variance_N2[axis] / contact.force_N[2].powi(2)).max(0.0);
+                *variance = (*variance + change.variance_N2[axis] / contact.force_N[2].powi(2)).max(0.0);
             }
         }
-        for (region, own) in self.extra.regions.iter_mut().flatten().zip(changes) {
-            region.load_N = sum(region.load_N, own.force_N);
+        for (region, change) in self.extra.regions.iter_mut().flatten().zip(changes) {
+            region.load_N = sum(region.load_N, change.force_N);
             region.mu = ratio(region.load_N);
-            region.shear_sigma_N = all_changed(region.shear_sigma_N, own.variance_N2);
+            region.shear_sigma_N = all_changed(region.shear_sigma_N, change.variance_N2);
             region.mu_sigma = region.shear_sigma_N.map(|sigma| sigma.map(|sigma| sigma / region.load_N[2].abs()));
             let centre = Resultant::of(&scene.sensor, &self.forces_N, region.taxels.iter().copied());
             region.centre_mm = centre.centre_mm;
@@ -51,8 +51,8 @@ impl Reconstruction {
         self.error = frame.resultant_N.map(|truth| Errors::new(truth, self.resultant_N));
         if let [whole] = self.subarrays.as_mut_slice() {
             whole.mu = ratio(self.resultant_N);
-            if let ([own], true) = (changes, whole.shear_sigma_N.is_some()) {
-                whole.shear_sigma_N = all_changed(whole.shear_sigma_N, own.variance_N2);
+            if let ([change], true) = (changes, whole.shear_sigma_N.is_some()) {
+                whole.shear_sigma_N = all_changed(whole.shear_sigma_N, change.variance_N2);
                 whole.mu_sigma = whole.shear_sigma_N.map(|sigma| sigma.map(|sigma| sigma / self.resultant_N[2].abs()));
             }
         }
