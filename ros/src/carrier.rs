@@ -23,7 +23,7 @@ pub type Taken = Box<dyn Fn() + Send + Sync>;
 /// A node of ROS 2 in its network.
 pub trait Carrier: Send + Sync {
     /// Where other nodes find it, in words.
-    fn place(&self) -> String;
+    fn address(&self) -> String;
 
     /// Begins to publish a topic.
     ///

@@ -135,18 +135,18 @@ fn contact((found, [x, y]): (&FoundContact, [f64; 2]), track: Option<&ContactTra
     }
 }
 
-/// The places of all patches that have one, at this time in ns since 1970.
+/// The poses of all patches that have one, at this time in ns since 1970.
 ///
 /// # Errors
 /// As [`Messages::wrench`].
-pub fn places(patches: &[Patch], time_ns: i64) -> Result<Option<Vec<u8>>> {
-    let place = |patch: &Patch| {
+pub fn poses(patches: &[Patch], time_ns: i64) -> Result<Option<Vec<u8>>> {
+    let transform = |patch: &Patch| {
         let pose: &Pose = patch.fields.pose.as_ref()?;
         let transform = Transform { translation: pose.xyz_m, rotation: pose.quaternion() };
         let header = header(&pose.parent, time_ns);
         Some(TransformStamped { header, child_frame_id: patch.frame_id.clone(), transform })
     };
-    let transforms: Vec<TransformStamped> = patches.iter().filter_map(place).collect();
+    let transforms: Vec<TransformStamped> = patches.iter().filter_map(transform).collect();
     match transforms.is_empty() {
         true => Ok(None),
         false => cdr(&TfMessage { transforms }).map(Some),

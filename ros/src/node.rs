@@ -119,7 +119,7 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
         let state = PatchState::new(index, &patch.fields.name, &patch.scene.name, late, Arc::clone(&changes));
         outlets.push(Outlet::open(carrier.as_ref(), file, patch, Arc::new(state))?);
     }
-    let places = match messages::places(&file.patches, now_ns())? {
+    let poses = match messages::poses(&file.patches, now_ns())? {
         Some(message) => {
             let publisher = carrier.publisher(&topics::tf_static())?;
             publisher.put(message)?;
@@ -133,7 +133,7 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let stopping = stop.clone();
     Interrupt::with(move || stopping.now())?;
     let (patches, threads) = (file.patches.len(), file.threads());
-    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.place());
+    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.address());
     let running = AtomicBool::new(true);
     let begun = Instant::now();
     if let Some(time) = measure {
@@ -168,7 +168,7 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
         })
     })?;
     let said = measure.map_or_else(String::new, |_| measured(file, &outlets, begun.elapsed()));
-    drop((outlets, places, reports));
+    drop((outlets, poses, reports));
     carrier.close().map(|()| said)
 }
 

@@ -3,7 +3,7 @@
 //! | topic | type | quality |
 //! |---|---|---|
 //! | `<namespace>/<patch>/wrench`, `contacts`, `arrows`, `forces`, `stress` | force of the patch, its contacts, pictures | stream |
-//! | `<namespace>/<patch>/scene`, `/tf_static` | text of the scene, places of the patches | latched |
+//! | `<namespace>/<patch>/scene`, `/tf_static` | text of the scene, poses of the patches | latched |
 //! | `/diagnostics` | state of each patch | reliable |
 //! | `<namespace>/<patch>/tare` | taken from others: a new zero | reliable |
 

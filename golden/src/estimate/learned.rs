@@ -50,7 +50,7 @@ pub use composed::ComposedLayer;
 pub use error::LearnedError;
 pub use frames::{GAINS, NOISE, RATIO};
 pub(crate) use network::LN_SIGMA;
-pub use network::PLACES;
+pub use network::OUTPUT_ROWS;
 pub use options::Training;
 pub use signature::{Cover, SensorRange, Signature};
 pub use training::{Stage, MEASURED_NOISE};
@@ -222,7 +222,7 @@ impl Learned {
         let (mut network, signature) = file::decode(bytes, file)?;
         signature.check(scene, estimator, file)?;
         if let Cover::Range(range) = &signature.cover {
-            network = network.with_stated(&range.place(&scene.sensor, scene.medium));
+            network = network.with_stated(&range.inputs_of(&scene.sensor, scene.medium));
         }
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         let first = FirstLayer::new(&features, &network.layers[0]);

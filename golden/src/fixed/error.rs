@@ -72,10 +72,10 @@ pub enum FixedError {
         value: String,
     },
     /// The gain of a taxel is outside the range for which the hardware is built.
-    #[error("input.calibration: the gain of taxel {place:?} is {gain}; hardware.table_range.gain allows {} to {}", allowed[0], allowed[1])]
+    #[error("input.calibration: the gain of taxel {taxel:?} is {gain}; hardware.table_range.gain allows {} to {}", allowed[0], allowed[1])]
     TableRange {
         /// Row and column.
-        place: [usize; 2],
+        taxel: [usize; 2],
         /// Its gain, MPa per unit of the readings.
         gain: f64,
         /// Least and largest |gain|.

@@ -24,7 +24,7 @@ const LARGEST: usize = 11;
 /// Where a window lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Place {
+pub enum WindowPosition {
     /// The window is the array, or as much larger on each side as on the opposite one.
     Array,
     /// The window has the contact's centre in its middle taxel.
@@ -35,7 +35,7 @@ pub enum Place {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// Where it lies.
-    pub place: Place,
+    pub place: WindowPosition,
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
@@ -46,7 +46,7 @@ impl Window {
     /// The window for an array with one contact.
     pub fn of(sensor: &Sensor) -> Window {
         if sensor.taxels() <= WHOLE_UP_TO {
-            return Window { place: Place::Array, rows: sensor.rows, cols: sensor.cols };
+            return Window { place: WindowPosition::Array, rows: sensor.rows, cols: sensor.cols };
         }
         Window::around_contact(sensor)
     }
@@ -54,7 +54,7 @@ impl Window {
     /// The window around a contact of an array with several.
     pub fn around_contact(sensor: &Sensor) -> Window {
         let lines = |pitch: f64| (2 * (REACH * sensor.thickness_mm / pitch).ceil() as usize + 1).min(LARGEST);
-        Window { place: Place::Contact, rows: lines(sensor.pitch_y_mm), cols: lines(sensor.pitch_x_mm) }
+        Window { place: WindowPosition::Contact, rows: lines(sensor.pitch_y_mm), cols: lines(sensor.pitch_x_mm) }
     }
 
     /// Number of taxels.
@@ -77,11 +77,11 @@ impl Window {
         let line =
             |centre: f64, pitch: f64, lines: usize| (centre / pitch + (lines as f64 - 1.0) / 2.0).round() as isize;
         match self.place {
-            Place::Array => {
+            WindowPosition::Array => {
                 let before = |lines: usize, own: usize| (lines as isize - own as isize) / 2;
                 [before(sensor.rows, self.rows), before(sensor.cols, self.cols)]
             }
-            Place::Contact => self.origin_around([
+            WindowPosition::Contact => self.origin_around([
                 line(centre_mm[1], sensor.pitch_y_mm, sensor.rows),
                 line(centre_mm[0], sensor.pitch_x_mm, sensor.cols),
             ]),
@@ -121,8 +121,8 @@ impl Window {
 impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let place = match self.place {
-            Place::Array => "whole array",
-            Place::Contact => "window around each contact",
+            WindowPosition::Array => "whole array",
+            WindowPosition::Contact => "window around each contact",
         };
         write!(f, "{place} of {} × {}", self.rows, self.cols)
     }
@@ -140,7 +140,7 @@ mod tests {
     fn a_small_array_is_a_window() {
         let array = sensor(10, 12);
         let window = Window::of(&array);
-        assert_eq!(window, Window { place: Place::Array, rows: 10, cols: 12 });
+        assert_eq!(window, Window { place: WindowPosition::Array, rows: 10, cols: 12 });
         let taxels = window.taxels_of(&array, window.origin(&array, [9.0, -9.0]));
         assert_eq!(taxels, (0..120).map(Some).collect::<Vec<_>>());
     }
@@ -148,7 +148,7 @@ mod tests {
     /// A larger window has the array in its middle, so that mirror images of taxels are those of the array.
     #[test]
     fn a_window_that_is_larger_than_the_array_has_it_in_its_middle() {
-        let (array, window) = (sensor(6, 8), Window { place: Place::Array, rows: 10, cols: 12 });
+        let (array, window) = (sensor(6, 8), Window { place: WindowPosition::Array, rows: 10, cols: 12 });
         let origin = window.origin(&array, [3.0, 1.0]);
         let taxels = window.taxels_of(&array, origin);
         assert_eq!(origin, [-2, -2]);
@@ -162,7 +162,7 @@ mod tests {
     fn a_window_has_the_contact_in_its_middle() {
         let array = sensor(20, 21);
         let window = Window::of(&array);
-        assert_eq!(window, Window { place: Place::Contact, rows: 9, cols: 11 });
+        assert_eq!(window, Window { place: WindowPosition::Contact, rows: 9, cols: 11 });
         for (taxel, shift) in [(0, [0.9, 1.9]), (20 * 21 - 1, [-0.9, -1.9]), (10 * 21 + 3, [0.0, 1.0])] {
             let [x, y] = array.position_mm(taxel / 21, taxel % 21);
             let origin = window.origin(&array, [x + shift[0], y + shift[1]]);

@@ -68,7 +68,7 @@ impl Block for FrameArbiter {
         let resets = Resets { rst, anew: None };
         let index = arrays.state(k, "index", Type::unsigned(index_bits), resets, 0);
         let whole = arrays.state(k, "whole", Type::unsigned(1), resets, 0);
-        let frames = k.memory("frames", arrays.places(self.taxels + 1), BITS, Contents::Undefined);
+        let frames = k.memory("frames", arrays.words(self.taxels + 1), BITS, Contents::Undefined);
 
         k.comment("A beat of the senders in turn, of those whose frame is not whole.");
         let heard = k.state("heard", Type::unsigned(arrays.bits), rst, 0);

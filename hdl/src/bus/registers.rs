@@ -7,7 +7,7 @@ use super::bundles::Accesses;
 use super::tables_in::OCTET_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
-use crate::primitives::{Arrays, QUEUE_PLACES};
+use crate::primitives::{Arrays, QUEUE_CAPACITY};
 
 block! {
     /// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
@@ -129,7 +129,7 @@ impl Block for Registers {
             })
             .collect();
         // As many as there are labels in the queue.
-        let frames = Type::unsigned(count_bits(QUEUE_PLACES + 1));
+        let frames = Type::unsigned(count_bits(QUEUE_CAPACITY + 1));
         let under_way = k.state("under_way", frames, io.rst, 0).comment("Frames that a reset would lose.");
         let none = k.constant(frames.bits, 0);
         under_way.set(io.restarting.mux(none, (*under_way + io.complete - io.whole).low(frames.bits)));

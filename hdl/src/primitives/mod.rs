@@ -80,5 +80,5 @@ pub(crate) use stream::beats::{through, Beats};
 pub use stream::beats::{Stream, StreamSignals};
 #[cfg(test)]
 pub(crate) use stream::queue::tests::List;
-pub use stream::queue::{Queue, PLACES as QUEUE_PLACES};
+pub use stream::queue::{Queue, CAPACITY as QUEUE_CAPACITY};
 pub use stream::register_slice::RegisterSlice;

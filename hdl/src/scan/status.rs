@@ -35,7 +35,7 @@ block! {
 const WORD: usize = 32;
 const BEAT: usize = 3 * WORD;
 /// Scans whose marks can wait: more than the frames that an engine holds.
-const PLACES: usize = 8;
+const CAPACITY: usize = 8;
 /// Marks of a scan.
 const MARKS: usize = 2;
 
@@ -49,13 +49,13 @@ impl ScanStatus {
 impl Block for ScanStatus {
     fn build<'k>(&self, k: &'k Builder, io: ScanStatusPorts<Inside<'k>>) {
         let marks = k
-            .state("marks", Type::unsigned(MARKS * PLACES), io.rst, 0)
+            .state("marks", Type::unsigned(MARKS * CAPACITY), io.rst, 0)
             .comment("Marks that wait, the next in the low bits.");
-        let waiting = k.state("waiting", Type::unsigned(count_bits(PLACES + 1)), io.rst, 0);
+        let waiting = k.state("waiting", Type::unsigned(count_bits(CAPACITY + 1)), io.rst, 0);
         let beat = k.state("beat", Type::unsigned(count_bits(self.forces + 1)), io.rst, 0);
         let word = k.state("word", Type::unsigned(count_bits(STATUS_BEATS)), io.rst, 0);
 
-        io.room.set(!waiting.is(PLACES as u64));
+        io.room.set(!waiting.is(CAPACITY as u64));
         io.s_axis.ready.set(io.m_axis.ready);
         io.m_axis.valid.set(io.s_axis.valid);
         io.m_axis.last.set(io.s_axis.last);
@@ -119,7 +119,7 @@ mod tests {
                 let flags = data.field(2 * WORD, WORD) as u32 | self.waiting.front().copied().unwrap_or(0);
                 data.set(2 * WORD, WORD, flags.into());
             }
-            vec![Some(Word::from(self.waiting.len() < PLACES)), bit(7), Some(data), bit(5), bit(6)]
+            vec![Some(Word::from(self.waiting.len() < CAPACITY)), bit(7), Some(data), bit(5), bit(6)]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
@@ -147,7 +147,7 @@ mod tests {
         let (mut under_way, mut beat, mut length) = (0, 0, FORCES + STATUS_BEATS);
         let of = |cycle: usize| {
             let rst = cycle < 2;
-            let complete = !rst && under_way < PLACES && random.u8(..9) == 0;
+            let complete = !rst && under_way < CAPACITY && random.u8(..9) == 0;
             let given = !rst && under_way > 0 && random.u8(..3) > 0;
             let ready = random.u8(..4) > 0;
             let last = beat + 1 == length;

@@ -221,7 +221,7 @@ impl DdsNode {
 }
 
 impl Carrier for DdsNode {
-    fn place(&self) -> String {
+    fn address(&self) -> String {
         let addresses: Vec<String> = self.interfaces.iter().map(ToString::to_string).collect();
         format!("DDS domain {} on {}", self.participant.domain_id(), addresses.join(", "))
     }

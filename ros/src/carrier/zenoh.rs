@@ -130,7 +130,7 @@ impl ZenohNode {
 }
 
 impl Carrier for ZenohNode {
-    fn place(&self) -> String {
+    fn address(&self) -> String {
         let addresses: Vec<String> = self.session.info().locators().wait().iter().map(ToString::to_string).collect();
         addresses.join(", ")
     }

@@ -8,7 +8,7 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_host::batch::Batch;
 use dermis_host::engine::EngineName;
 
-use crate::guard::{copy, dermis_status, guarded, reference, room, text, values, Error};
+use crate::guard::{buffer, copy, dermis_status, guarded, reference, text, values, Error};
 use crate::scene::dermis_scene;
 
 /// Where the results of dermis_reconstruct_many are written, one after the other. An array that is NULL is left out.
@@ -39,14 +39,14 @@ struct Arrays<'a> {
 
 impl<'a> Arrays<'a> {
     /// # Safety
-    /// As [`room`] for each array.
+    /// As [`buffer`] for each array.
     unsafe fn new(batch: &dermis_batch, taxels: usize) -> Result<Arrays<'a>, Error> {
         let dermis_batch { results, resultant_N, sigma_N, flags, fx_N, fy_N, fz_N } = *batch;
         let too_many = || Error::input(format!("results = {results} is not allowed; they are more than memory has"));
         let floats = |name: &str, array: *mut f64, each: usize| -> Result<_, Error> {
             let wanted = if array.is_null() { 0 } else { results };
             let length = wanted.checked_mul(each).ok_or_else(too_many)?;
-            Ok((unsafe { room(name, array, length) }?, each))
+            Ok((unsafe { buffer(name, array, length) }?, each))
         };
         Ok(Arrays {
             floats: [
@@ -56,7 +56,7 @@ impl<'a> Arrays<'a> {
                 floats("fy_N", fy_N, taxels)?,
                 floats("fz_N", fz_N, taxels)?,
             ],
-            flags: unsafe { room("flags", flags, if flags.is_null() { 0 } else { results }) }?,
+            flags: unsafe { buffer("flags", flags, if flags.is_null() { 0 } else { results }) }?,
         })
     }
 

@@ -15,7 +15,7 @@ use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
 use dermis_host::link::{open_board, HostError, Session};
 
-use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text, Error};
+use crate::guard::{dermis_status, exclusive, free, guarded, output, reference, text, Error};
 use crate::result::dermis_result;
 use crate::scene::{dermis_scene, one_frame};
 use crate::stream::pace;
@@ -51,7 +51,7 @@ pub unsafe extern "C" fn dermis_board_open(
     board: *mut *mut dermis_board,
 ) -> dermis_status {
     guarded(|| {
-        let board = unsafe { place("board", board) }?;
+        let board = unsafe { output("board", board) }?;
         board.write(std::ptr::null_mut());
         let scene = &unsafe { reference("scene", scene) }?.spec;
         let port = unsafe { text("port", port) }?;
@@ -82,9 +82,9 @@ pub unsafe extern "C" fn dermis_board_frame(
     error_ns: *mut u64,
 ) -> dermis_status {
     guarded(|| {
-        let result = unsafe { place("result", result) }?;
+        let result = unsafe { output("result", result) }?;
         result.write(std::ptr::null_mut());
-        let mut error_ns = if error_ns.is_null() { None } else { Some(unsafe { place("error_ns", error_ns) }?) };
+        let mut error_ns = if error_ns.is_null() { None } else { Some(unsafe { output("error_ns", error_ns) }?) };
         if let Some(error_ns) = &mut error_ns {
             error_ns.write(0);
         }

@@ -133,14 +133,14 @@ pub unsafe fn exclusive<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T,
     Ok(unsafe { &mut *pointer })
 }
 
-/// The place that the argument `name` points to; what stands there may be no value yet.
+/// The output to which the argument `name` points; there may be no value yet.
 ///
 /// # Errors
 /// NULL.
 ///
 /// # Safety
-/// The pointer is NULL or one to room for a value that nothing else uses.
-pub unsafe fn place<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut MaybeUninit<T>, Error> {
+/// The pointer is NULL or one to memory for a value that nothing else uses.
+pub unsafe fn output<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut MaybeUninit<T>, Error> {
     unsafe { exclusive(name, pointer.cast()) }
 }
 
@@ -160,14 +160,14 @@ pub unsafe fn values<'a, T>(name: &str, pointer: *const T, length: usize) -> Res
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// Room for `length` values from the argument `name` on, which may be no values yet; for none the pointer may be NULL.
+/// The buffer of `length` values from the argument `name` on, which may be no values yet; for none the pointer may be NULL.
 ///
 /// # Errors
 /// NULL.
 ///
 /// # Safety
-/// The pointer is NULL or one to room for as many values, which nothing else uses.
-pub unsafe fn room<'a, T>(name: &str, pointer: *mut T, length: usize) -> Result<&'a mut [MaybeUninit<T>], Error> {
+/// The pointer is NULL or one to memory for as many values, which nothing else uses.
+pub unsafe fn buffer<'a, T>(name: &str, pointer: *mut T, length: usize) -> Result<&'a mut [MaybeUninit<T>], Error> {
     if length == 0 {
         return Ok(&mut []);
     }
@@ -176,10 +176,10 @@ pub unsafe fn room<'a, T>(name: &str, pointer: *mut T, length: usize) -> Result<
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
-/// Copies values to room for them: as many as there are and have room.
-pub fn copy<T: Copy>(values: &[T], room: &mut [MaybeUninit<T>]) {
-    room.iter_mut().zip(values).for_each(|(room, value)| {
-        room.write(*value);
+/// Copies values to a buffer: as many as there are and fit.
+pub fn copy<T: Copy>(values: &[T], buffer: &mut [MaybeUninit<T>]) {
+    buffer.iter_mut().zip(values).for_each(|(buffer, value)| {
+        buffer.write(*value);
     });
 }
 

@@ -18,7 +18,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
 use dermis_host::link::{check_identity, BoardAnswer, PhysicalAnswer};
 
-use crate::guard::{attempt, copy, dermis_status, exclusive, free, guarded, place, reference, room, values, Error};
+use crate::guard::{attempt, buffer, copy, dermis_status, exclusive, free, guarded, output, reference, values, Error};
 use crate::result::dermis_result;
 use crate::scene::{dermis_scene, frames};
 use crate::stream::pace;
@@ -52,13 +52,13 @@ impl dermis_link {
     fn request(&mut self, kind: Kind, payload: Vec<u8>, wire: &mut Wire) -> Result<u8, Error> {
         let sequence = self.sequence.wrapping_add(1);
         let bytes = Packet { kind, sequence, payload }.to_wire();
-        let (needs, has) = (bytes.len(), wire.room.len());
-        let room = wire.room.get_mut(..needs).ok_or_else(|| {
+        let (needs, has) = (bytes.len(), wire.buffer.len());
+        let buffer = wire.buffer.get_mut(..needs).ok_or_else(|| {
             Error::input(format!(
                 "capacity = {has} is not allowed; the request has {needs} bytes: dermis_link_capacity"
             ))
         })?;
-        copy(&bytes, room);
+        copy(&bytes, buffer);
         wire.size.write(needs);
         self.sequence = sequence;
         Ok(sequence)
@@ -104,17 +104,17 @@ impl dermis_link {
 
 /// Where the bytes of a request go.
 struct Wire<'a> {
-    room: &'a mut [MaybeUninit<u8>],
+    buffer: &'a mut [MaybeUninit<u8>],
     size: &'a mut MaybeUninit<usize>,
 }
 
 impl Wire<'_> {
     /// # Safety
-    /// As [`room`] and [`place`].
+    /// As [`buffer`] and [`output`].
     unsafe fn new<'a>(wire: *mut u8, capacity: usize, size: *mut usize) -> Result<Wire<'a>, Error> {
-        let size = unsafe { place("size", size) }?;
+        let size = unsafe { output("size", size) }?;
         size.write(0);
-        Ok(Wire { room: unsafe { room("wire", wire, capacity) }?, size })
+        Ok(Wire { buffer: unsafe { buffer("wire", wire, capacity) }?, size })
     }
 }
 
@@ -128,7 +128,7 @@ pub unsafe extern "C" fn dermis_link_new(
     link: *mut *mut dermis_link,
 ) -> dermis_status {
     guarded(|| {
-        let link = unsafe { place("link", link) }?;
+        let link = unsafe { output("link", link) }?;
         link.write(std::ptr::null_mut());
         let scene = unsafe { reference("scene", scene) }?;
         let model = Model::new(&scene.spec)?;
@@ -229,8 +229,8 @@ pub unsafe extern "C" fn dermis_link_receive(
     result: *mut *mut dermis_result,
 ) -> dermis_status {
     guarded(|| {
-        let (used, result) = unsafe { (place("used", used)?, place("result", result)?) };
-        let answer = unsafe { place("answer", answer) }?;
+        let (used, result) = unsafe { (output("used", used)?, output("result", result)?) };
+        let answer = unsafe { output("answer", answer) }?;
         let used = used.write(0);
         result.write(std::ptr::null_mut());
         answer.write(dermis_answer::None);

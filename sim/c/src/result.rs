@@ -10,7 +10,7 @@ use dermis_golden::result::flags::FlagSet;
 use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use dermis_host::link::PhysicalAnswer;
 
-use crate::guard::{attempt, copy, dermis_status, free, guarded, place, reference, room, Error};
+use crate::guard::{attempt, buffer, copy, dermis_status, free, guarded, output, reference, Error};
 
 /// One contact of a result. A figure counts where its marker is true; else it is NaN.
 #[repr(C)]
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn dermis_result_free(result: *mut dermis_result) {
 pub unsafe extern "C" fn dermis_result_resultant(result: *const dermis_result, force_N: *mut f64) -> dermis_status {
     guarded(|| {
         let result = unsafe { reference("result", result) }?;
-        copy(&result.resultant_N(), unsafe { room("force_N", force_N, 3) }?);
+        copy(&result.resultant_N(), unsafe { buffer("force_N", force_N, 3) }?);
         Ok(())
     })
 }
@@ -157,9 +157,9 @@ pub unsafe extern "C" fn dermis_result_resultant(result: *const dermis_result, f
 #[no_mangle]
 pub unsafe extern "C" fn dermis_result_time(result: *const dermis_result, time_ns: *mut i64) -> dermis_status {
     guarded(|| {
-        let place = unsafe { place("time_ns", time_ns) }?;
+        let output = unsafe { output("time_ns", time_ns) }?;
         let time_ns = unsafe { reference("result", result) }?.time_ns;
-        place.write(time_ns.ok_or_else(|| Error::absent("time of acquisition"))?);
+        output.write(time_ns.ok_or_else(|| Error::absent("time of acquisition"))?);
         Ok(())
     })
 }
@@ -183,9 +183,9 @@ pub unsafe extern "C" fn dermis_result_forces(
             return Err(Error::input(format!("taxels = {taxels} is not allowed; the result has {wanted}")));
         }
         // All three are checked before one is written.
-        let fx = unsafe { room("fx_N", fx_N, taxels) }?;
-        let fy = unsafe { room("fy_N", fy_N, taxels) }?;
-        let fz = unsafe { room("fz_N", fz_N, taxels) }?;
+        let fx = unsafe { buffer("fx_N", fx_N, taxels) }?;
+        let fy = unsafe { buffer("fy_N", fy_N, taxels) }?;
+        let fz = unsafe { buffer("fz_N", fz_N, taxels) }?;
         copy(&forces.fx, fx);
         copy(&forces.fy, fy);
         copy(&forces.fz, fz);
@@ -204,10 +204,10 @@ pub unsafe extern "C" fn dermis_result_contacts(
     count: *mut usize,
 ) -> dermis_status {
     guarded(|| {
-        let count = unsafe { place("count", count) }?;
+        let count = unsafe { output("count", count) }?;
         count.write(0);
         let all = unsafe { reference("result", result) }?.contacts().ok_or_else(|| Error::absent("contacts"))?;
-        copy(&all, unsafe { room("contacts", contacts, capacity) }?);
+        copy(&all, unsafe { buffer("contacts", contacts, capacity) }?);
         count.write(all.len());
         Ok(())
     })
@@ -217,7 +217,7 @@ pub unsafe extern "C" fn dermis_result_contacts(
 #[no_mangle]
 pub unsafe extern "C" fn dermis_result_flags(result: *const dermis_result, flags: *mut u32) -> dermis_status {
     guarded(|| {
-        let flags = unsafe { place("flags", flags) }?;
+        let flags = unsafe { output("flags", flags) }?;
         flags.write(unsafe { reference("result", result) }?.flags());
         Ok(())
     })

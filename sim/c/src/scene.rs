@@ -8,7 +8,7 @@ use dermis_golden::physics::forward::ForwardModel;
 use dermis_golden::spec::scene::Scene;
 use dermis_host::engine::{self, EngineName, Engines};
 
-use crate::guard::{attempt, dermis_status, free, guarded, place, reference, text, values, Error};
+use crate::guard::{attempt, dermis_status, free, guarded, output, reference, text, values, Error};
 use crate::result::dermis_result;
 
 /// A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
@@ -73,7 +73,7 @@ pub(crate) unsafe fn one_frame(
 #[no_mangle]
 pub unsafe extern "C" fn dermis_scene_load(name: *const c_char, scene: *mut *mut dermis_scene) -> dermis_status {
     guarded(|| {
-        let scene = unsafe { place("scene", scene) }?;
+        let scene = unsafe { output("scene", scene) }?;
         scene.write(std::ptr::null_mut());
         let spec = Scene::load(unsafe { text("name", name) }?).map_err(Error::input)?;
         scene.write(dermis_scene::into_raw(spec));
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn dermis_scene_parse(
     scene: *mut *mut dermis_scene,
 ) -> dermis_status {
     guarded(|| {
-        let scene = unsafe { place("scene", scene) }?;
+        let scene = unsafe { output("scene", scene) }?;
         scene.write(std::ptr::null_mut());
         let (toml, origin) = unsafe { (text("toml", toml)?, text("origin", origin)?) };
         scene.write(dermis_scene::into_raw(Scene::parse(toml, origin).map_err(Error::input)?));
@@ -146,7 +146,7 @@ pub unsafe extern "C" fn dermis_reconstruct(
     result: *mut *mut dermis_result,
 ) -> dermis_status {
     guarded(|| {
-        let result = unsafe { place("result", result) }?;
+        let result = unsafe { output("result", result) }?;
         result.write(std::ptr::null_mut());
         let scene = unsafe { reference("scene", scene) }?;
         let name = EngineName::software(unsafe { text("engine", engine) }?)?;

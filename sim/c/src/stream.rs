@@ -14,7 +14,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_host::engine::{typed, EngineName};
 
-use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text};
+use crate::guard::{dermis_status, exclusive, free, guarded, output, reference, text};
 use crate::result::dermis_result;
 use crate::scene::{dermis_scene, one_frame};
 
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn dermis_stream_new(
     stream: *mut *mut dermis_stream,
 ) -> dermis_status {
     guarded(|| {
-        let stream = unsafe { place("stream", stream) }?;
+        let stream = unsafe { output("stream", stream) }?;
         stream.write(std::ptr::null_mut());
         let spec = &unsafe { reference("scene", scene) }?.spec;
         let name = EngineName::software(unsafe { text("engine", engine) }?)?;
@@ -104,7 +104,7 @@ unsafe fn push(
     result: *mut *mut dermis_result,
 ) -> dermis_status {
     guarded(|| {
-        let result = unsafe { place("result", result) }?;
+        let result = unsafe { output("result", result) }?;
         result.write(std::ptr::null_mut());
         let dermis_stream { engine, checks } = unsafe { exclusive("stream", stream) }?;
         let frame = unsafe { one_frame(engine.scene(), stress_MPa, count, "a stream") }?;

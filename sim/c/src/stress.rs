@@ -2,7 +2,7 @@
 
 use dermis_golden::physics::forward::{ForwardModel, PointForce, AXES};
 
-use crate::guard::{copy, dermis_status, guarded, reference, room, values, Error};
+use crate::guard::{buffer, copy, dermis_status, guarded, reference, values, Error};
 use crate::scene::dermis_scene;
 
 /// Coordinates of a point: x, y.
@@ -31,8 +31,8 @@ pub unsafe extern "C" fn dermis_stress(
     guarded(|| {
         let scene = unsafe { reference("scene", scene) }?;
         let forces_N = unsafe { values("forces_N", forces_N, count) }?;
-        let room = unsafe { room("stress_MPa", stress_MPa, count / AXES) }?;
-        copy(&scene.forward().of_cells(forces_N).map_err(Error::input)?, room);
+        let buffer = unsafe { buffer("stress_MPa", stress_MPa, count / AXES) }?;
+        copy(&scene.forward().of_cells(forces_N).map_err(Error::input)?, buffer);
         Ok(())
     })
 }
@@ -57,13 +57,13 @@ pub unsafe extern "C" fn dermis_stress_of_points(
         };
         let at_mm = unsafe { values("at_mm", at_mm, length(PLANE)?) }?;
         let forces_N = unsafe { values("forces_N", forces_N, length(AXES)?) }?;
-        let room = unsafe { room("stress_MPa", stress_MPa, scene.spec.sensor.taxels()) }?;
+        let buffer = unsafe { buffer("stress_MPa", stress_MPa, scene.spec.sensor.taxels()) }?;
         let point = |(at, force): (&[f64], &[f64])| PointForce {
             at_mm: [at[0], at[1]],
             force_N: [force[0], force[1], force[2]],
         };
         let forces = at_mm.chunks_exact(PLANE).zip(forces_N.chunks_exact(AXES)).map(point).collect();
-        copy(&scene.forward().of_points(&[forces]).map_err(Error::input)?, room);
+        copy(&scene.forward().of_points(&[forces]).map_err(Error::input)?, buffer);
         Ok(())
     })
 }

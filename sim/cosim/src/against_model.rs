@@ -14,7 +14,7 @@ use dermis_golden::spec::board::EngineKind;
 use dermis_hdl::device::Device;
 
 use super::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};
-use super::findings::{Findings, FrameComparison, Place};
+use super::findings::{Findings, FrameComparison, WordLocation};
 
 /// Shortest watchdog, in cycles without a transfer.
 const WATCHDOG_MIN: u64 = 10_000;
@@ -121,8 +121,8 @@ pub fn compare_recording(
         // First in the list: a watchdog timeout explains all missing words after it.
         for timeout in recording.timeout.iter().filter(|t| here(t.beat)) {
             let (index, cycle) = (timeout.beat - beats_before, Some(timeout.cycle));
-            let place = Place { stage: "watchdog", index, cycle, taxel: None };
-            comparison.add_violation(place, timeout.rule.clone());
+            let location = WordLocation { stage: "watchdog", index, cycle, taxel: None };
+            comparison.add_violation(location, timeout.rule.clone());
         }
         compare_stage_names(&mut comparison, vector, taps);
         for stage in &vector.expected.stages {
@@ -152,8 +152,8 @@ pub fn compare_recording(
         }
         for violation in recording.violations.iter().filter(|v| here(v.beat)) {
             let (index, cycle) = (violation.beat - beats_before, Some(violation.cycle));
-            let place = Place { stage: "handshake", index, cycle, taxel: None };
-            comparison.add_violation(place, violation.rule.clone());
+            let location = WordLocation { stage: "handshake", index, cycle, taxel: None };
+            comparison.add_violation(location, violation.rule.clone());
         }
         if exact && beats_after > beats_before {
             let times = &recording.times[number];
@@ -181,12 +181,14 @@ fn compare_word(
     let forces = stage == "beats" && vector.expected.beats.len() == vector.taxels;
     let per_taxel = (stage == "receive" || forces) && expected.is_some();
     let taxel = per_taxel.then(|| [index / vector.cols, index % vector.cols]);
-    comparison.compare(Place { stage, index, taxel, cycle }, expected, got);
+    comparison.compare(WordLocation { stage, index, taxel, cycle }, expected, got);
 }
 
 /// Checks that the device's taps and the model's stages have the same names.
 fn compare_stage_names(comparison: &mut FrameComparison, vector: &Vector, taps: &[&'static str]) {
-    let mut add = |stage, rule: &str| comparison.add_violation(Place { stage, ..Place::default() }, rule.to_owned());
+    let mut add = |stage, rule: &str| {
+        comparison.add_violation(WordLocation { stage, ..WordLocation::default() }, rule.to_owned())
+    };
     let stages: Vec<&str> = vector.expected.stages.iter().map(|s| s.name).collect();
     for name in taps.iter().filter(|t| !stages.contains(t)) {
         add(name, "the hardware has a tap for which the model has no stage");
@@ -204,8 +206,8 @@ fn compare_beat_cycles(comparison: &mut FrameComparison, expected: &[u64], times
     for (index, (beat, expected)) in beats.iter().zip(expected).enumerate() {
         let due = last_in + expected;
         if beat.cycle != due {
-            let place = Place { stage: "cycles", index, cycle: Some(beat.cycle), taxel: None };
-            comparison.add_violation(place, format!("output beat {index} was due in cycle {due}"));
+            let location = WordLocation { stage: "cycles", index, cycle: Some(beat.cycle), taxel: None };
+            comparison.add_violation(location, format!("output beat {index} was due in cycle {due}"));
         }
     }
 }
@@ -215,8 +217,8 @@ fn compare_cycle_counts(comparison: &mut FrameComparison, expected: Cycles, time
     for (index, (name, due, got)) in pairs.into_iter().enumerate() {
         if got != Some(due) {
             let got = got.map_or("no end".to_owned(), |g| g.to_string());
-            let place = Place { stage: "cycles", index, cycle: times.last_out, taxel: None };
-            comparison.add_violation(place, format!("{name}: expected {due} cycles, got {got}"));
+            let location = WordLocation { stage: "cycles", index, cycle: times.last_out, taxel: None };
+            comparison.add_violation(location, format!("{name}: expected {due} cycles, got {got}"));
         }
     }
 }

@@ -81,7 +81,7 @@ impl Findings {
 
 /// Where a word of a frame is.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Place<'a> {
+pub struct WordLocation<'a> {
     /// As in [`Mismatch::stage`].
     pub stage: &'a str,
     /// As in [`Mismatch::index`].
@@ -107,19 +107,19 @@ impl<'a> FrameComparison<'a> {
     }
 
     /// Compares one word; at most one of the two is missing.
-    pub fn compare(&mut self, place: Place, expected: Option<Vec<i64>>, got: Option<Vec<i64>>) {
+    pub fn compare(&mut self, location: WordLocation, expected: Option<Vec<i64>>, got: Option<Vec<i64>>) {
         if expected != got {
-            self.add(place, expected, got, None);
+            self.add(location, expected, got, None);
         }
     }
 
     /// Adds a violated rule.
-    pub fn add_violation(&mut self, place: Place, rule: String) {
-        self.add(place, None, None, Some(rule));
+    pub fn add_violation(&mut self, location: WordLocation, rule: String) {
+        self.add(location, None, None, Some(rule));
     }
 
-    fn add(&mut self, place: Place, expected: Option<Vec<i64>>, got: Option<Vec<i64>>, rule: Option<String>) {
-        let Place { stage, index, taxel, cycle } = place;
+    fn add(&mut self, location: WordLocation, expected: Option<Vec<i64>>, got: Option<Vec<i64>>, rule: Option<String>) {
+        let WordLocation { stage, index, taxel, cycle } = location;
         self.findings.count += 1;
         self.findings.unequal.insert(self.number);
         if self.findings.kept.len() < KEPT_PER_FRAME {

@@ -14,14 +14,14 @@
 //! | [`newest`] | the newest picture, and waiting for it |
 //! | [`picture`] | a result as the page gets it |
 //! | [`finger`] | frames of the contact that the page's mouse describes |
-//! | [`places`] | how many connections there are, and which one ends for a new one |
+//! | [`connections`] | how many connections there are, and which one ends for a new one |
 //! | [`request`] | requests of bounded size; which of them are refused |
 //! | [`server`] | the connections, and what is served |
 
+pub mod connections;
 pub mod finger;
 pub mod newest;
 pub mod picture;
-pub mod places;
 pub mod request;
 pub mod server;
 

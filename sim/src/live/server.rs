@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 use dermis_golden::spec::scene::Scene;
 use serde_json::json;
 
+use super::connections::{Connections, Taken, CLIENTS, OF_AN_ADDRESS};
 use super::finger::{Finger, Hand};
 use super::newest::Newest;
-use super::places::{Places, Taken, CLIENTS, OF_AN_ADDRESS};
 use super::request::{read, Request};
 use dermis_report::style::{escape, variables};
 
@@ -40,7 +40,7 @@ pub struct Server {
     page: String,
     newest: Arc<Newest>,
     hand: Option<Arc<Hand>>,
-    places: Places,
+    connections: Connections,
 }
 
 /// An answer: status, further header lines, type, body.
@@ -55,7 +55,7 @@ impl Server {
     /// A server of the pictures of a scene, from `source` in words; with a `hand` the page's mouse moves it.
     pub fn new(scene: &Scene, source: &str, newest: Arc<Newest>, hand: Option<Arc<Hand>>) -> Server {
         let page = page(scene, source, hand.is_some());
-        Server { scene: scene.clone(), page, newest, hand, places: Places::default() }
+        Server { scene: scene.clone(), page, newest, hand, connections: Connections::default() }
     }
 
     /// Serves for ever, each connection in its own thread. Where no connection can be taken, as without a free file
@@ -83,7 +83,7 @@ impl Server {
                     if !std::mem::replace(&mut failing, true) {
                         say(&format!("no connection can be taken: {error}; it is tried again"));
                     }
-                    server.places.end_one();
+                    server.connections.end_one();
                     std::thread::sleep(RETRY);
                 }
             }
@@ -93,7 +93,7 @@ impl Server {
     /// Serves a connection in a thread of its own, or refuses it.
     fn begin(self: &Arc<Self>, stream: TcpStream, address: IpAddr) -> Result<Taken> {
         let stream = Arc::new(stream);
-        let taken = self.places.take(&stream, address);
+        let taken = self.connections.take(&stream, address);
         if taken == Taken::Refused {
             // Here, without a thread: a client that does not read its answer loses it.
             let _ = stream.set_nonblocking(true).and_then(|()| refuse(&stream));
@@ -103,21 +103,21 @@ impl Server {
         let serve = move || {
             // A client that goes away is no error.
             let _ = server.connection(&own);
-            server.places.leave(&own);
+            server.connections.leave(&own);
         };
         let begun = std::thread::Builder::new().spawn(serve).map(|_| taken);
-        begun.inspect_err(|_| self.places.leave(&stream))
+        begun.inspect_err(|_| self.connections.leave(&stream))
     }
 
     fn connection(&self, stream: &Arc<TcpStream>) -> Result<()> {
         stream.set_nodelay(true)?;
         while let Some(request) = read(&mut Until::after(PATIENCE, stream))? {
-            self.places.waits(stream, false);
+            self.connections.waits(stream, false);
             match request {
                 Ok(request) => self.respond(stream, &request)?,
                 Err((status, text)) => return last_answer(stream, &plain(status, &text)),
             }
-            self.places.waits(stream, true);
+            self.connections.waits(stream, true);
         }
         Ok(())
     }

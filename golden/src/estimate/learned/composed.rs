@@ -16,7 +16,7 @@ use super::network::Layer;
 use super::Learned;
 use crate::physics::symmetry::folded::EVEN;
 use crate::spec::quads::Quads;
-use crate::spec::window::Place;
+use crate::spec::window::WindowPosition;
 use faer::Mat;
 
 /// A layer that takes the parities of b/s, s the power of two above max |b|, or those of the layer before.
@@ -37,7 +37,7 @@ impl Learned {
     pub fn composed(&self, alive: &[bool]) -> Vec<ComposedLayer> {
         let FirstLayer { stress, mask } = &self.first;
         let mut first = plain(stress);
-        if self.signature.window.place == Place::Contact {
+        if self.signature.window.place == WindowPosition::Contact {
             first.mask = Some(mask.each_ref().map(|own| wide(own.as_ref())));
         } else {
             let window = self.signature.window;

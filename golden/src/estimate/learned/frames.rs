@@ -32,7 +32,7 @@ use crate::physics::smooth::{terms, TERMS};
 use crate::random::Random;
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
-use crate::spec::window::{Place, Window};
+use crate::spec::window::{Window, WindowPosition};
 use faer::Mat;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -99,8 +99,8 @@ impl Frames {
     /// As [`Draws::new`].
     pub fn new(scene: &Scene, window: Window, training: &Training, seed: u64) -> Result<Frames, GeneratorError> {
         let most = match window.place {
-            Place::Array => 1,
-            Place::Contact => 4,
+            WindowPosition::Array => 1,
+            WindowPosition::Contact => 4,
         };
         let draws = (1..=most)
             .map(|contacts| {

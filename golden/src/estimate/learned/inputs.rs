@@ -38,8 +38,8 @@ pub(super) struct Inputs {
 struct OfSensor {
     features: Features,
     frames: Frames,
-    /// Where it lies in the range.
-    place: Option<[f32; SensorRange::INPUTS]>,
+    /// The inputs that state where it lies in the range.
+    range_inputs: Option<[f32; SensorRange::INPUTS]>,
 }
 
 impl Inputs {
@@ -53,9 +53,9 @@ impl Inputs {
             Ok(OfSensor {
                 features: Features::new(&window, &scene.sensor, scene.medium)?,
                 frames: Frames::new(scene, window, training, seed)?,
-                place: match &signature.cover {
+                range_inputs: match &signature.cover {
                     Cover::One { .. } => None,
-                    Cover::Range(range) => Some(range.place(&scene.sensor, scene.medium)),
+                    Cover::Range(range) => Some(range.inputs_of(&scene.sensor, scene.medium)),
                 },
             })
         };
@@ -109,11 +109,11 @@ impl OfSensor {
     fn mix(&self, frames: usize, noise: [f64; 2], random: &mut Random) -> (Parities, Mat<f32>) {
         let (readings, truth) = self.frames.mix(frames, noise, random);
         let mut inputs = self.features.of(&readings);
-        if let Some(place) = self.place {
+        if let Some(values) = self.range_inputs {
             for (parity, inputs) in inputs.iter_mut().enumerate() {
                 let channels = inputs.nrows();
-                inputs.resize_with(channels + place.len(), frames, |row, _| match parity {
-                    EVEN => place[row - channels],
+                inputs.resize_with(channels + values.len(), frames, |row, _| match parity {
+                    EVEN => values[row - channels],
                     _ => 0.0,
                 });
             }

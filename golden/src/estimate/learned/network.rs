@@ -26,7 +26,7 @@ pub(super) const OUTPUT_CHANNELS: usize = 2;
 /// Number of outputs.
 pub(crate) const OUTPUTS: usize = 4;
 /// Parity and channel of each output.
-pub const PLACES: [(usize, usize); OUTPUTS] = [(ODD_X, 0), (ODD_Y, 0), (EVEN, 0), (EVEN, 1)];
+pub const OUTPUT_ROWS: [(usize, usize); OUTPUTS] = [(ODD_X, 0), (ODD_Y, 0), (EVEN, 0), (EVEN, 1)];
 /// Range of ln σ, σ in units of mu_max.
 pub(crate) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
 
@@ -192,7 +192,7 @@ impl Network {
     /// The outputs of each frame, from the last layer's parities.
     pub fn outputs(last: &Parities) -> Mat<f32> {
         Mat::from_fn(OUTPUTS, last[0].ncols(), |output, frame| {
-            let (parity, channel) = PLACES[output];
+            let (parity, channel) = OUTPUT_ROWS[output];
             last[parity][(channel, frame)]
         })
     }

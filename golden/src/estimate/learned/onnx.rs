@@ -16,7 +16,7 @@
 mod proto;
 
 use super::features::AMPLITUDE;
-use super::network::{LN_SIGMA, PLACES};
+use super::network::{LN_SIGMA, OUTPUT_ROWS};
 use super::Learned;
 use crate::physics::symmetry::folded::EVEN;
 use crate::physics::symmetry::parity::sign;
@@ -161,7 +161,7 @@ impl Learned {
 
     /// Adds μ and σ from the parities of the last layer.
     fn add_outputs(&self, graph: &mut Builder, last: &str) {
-        let outputs: Vec<String> = PLACES
+        let outputs: Vec<String> = OUTPUT_ROWS
             .iter()
             .enumerate()
             .map(|(output, (parity, channel))| {
@@ -178,7 +178,7 @@ impl Learned {
             let of: Vec<&str> = of.iter().map(String::as_str).collect();
             graph.add_with("Concat", &of, name, vec![Attribute::int("axis", 1)])
         };
-        let (mean, ln_sigma) = outputs.split_at(PLACES.len() / 2);
+        let (mean, ln_sigma) = outputs.split_at(OUTPUT_ROWS.len() / 2);
         let mu_max = graph.scalar("mu_max", self.signature.mu_max as f32);
         let mean = joined(graph, mean, "mean_of_mu_max");
         let mean = graph.add("Mul", &[&mean, &mu_max], "mean");

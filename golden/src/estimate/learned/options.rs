@@ -8,7 +8,7 @@
 use super::error::LearnedError;
 use crate::data::generator::slip::Slip;
 use crate::spec::scene::Medium;
-use crate::spec::window::{Place, Window};
+use crate::spec::window::{Window, WindowPosition};
 
 /// Fewest rows and columns of a sensor of a range.
 const LEAST_SIDE: usize = 4;
@@ -120,7 +120,7 @@ impl Training {
             }
         }
         if let Some(least) = self.least_side {
-            let largest = if window.place == Place::Array { window.rows.min(window.cols) } else { 0 };
+            let largest = if window.place == WindowPosition::Array { window.rows.min(window.cols) } else { 0 };
             if self.pitch_over_thickness.is_none() || !(LEAST_SIDE..=largest).contains(&least) {
                 let allowed = "from 4 to the rows and columns of a scene that is one window, for a range of pitches";
                 return fail("least_side", least as f64, allowed);
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn options_out_of_range() {
-        let window = Window { place: Place::Array, rows: 8, cols: 10 };
+        let window = Window { place: WindowPosition::Array, rows: 8, cols: 10 };
         let refused = |training: Training| match training.check(Medium::HalfSpace, window) {
             Err(LearnedError::Option { field, .. }) => field,
             _ => "none",

@@ -13,7 +13,7 @@ use super::error::LearnedError;
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Medium, Scene};
 use crate::spec::sensor::Sensor;
-use crate::spec::window::{Place, Window};
+use crate::spec::window::{Window, WindowPosition};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -135,7 +135,7 @@ impl SensorRange {
     pub const POISSON: [f64; 2] = [0.3, 0.499];
 
     /// Where a sensor lies in the range, from −1 to 1 within it: the logarithms of both pitches over the thickness, Poisson ratio.
-    pub(super) fn place(&self, sensor: &Sensor, medium: Medium) -> [f32; SensorRange::INPUTS] {
+    pub(super) fn inputs_of(&self, sensor: &Sensor, medium: Medium) -> [f32; SensorRange::INPUTS] {
         let within = |[low, high]: [f64; 2], value: f64| match high > low {
             true => (2.0 * (value - low) / (high - low) - 1.0) as f32,
             false => 0.0,
@@ -243,7 +243,7 @@ impl Signature {
             (fewest..=largest).contains(&own) && (largest - own).is_multiple_of(2)
         };
         let places = [self.window.place, array.place];
-        places == [Place::Array; 2]
+        places == [WindowPosition::Array; 2]
             && fits(array.rows, self.window.rows, sensor.pitch_y_mm)
             && fits(array.cols, self.window.cols, sensor.pitch_x_mm)
     }
@@ -321,7 +321,7 @@ mod tests {
         let spread = signature.cover.scenes(&scene, 60);
         let serves = |scene: &Scene| signature.check(scene, EstimatorKind::Network, "n").is_ok();
         assert!(spread.len() == 60 && spread.iter().all(serves));
-        let places: Vec<[f32; 3]> = spread.iter().map(|scene| range.place(&scene.sensor, scene.medium)).collect();
+        let places: Vec<[f32; 3]> = spread.iter().map(|scene| range.inputs_of(&scene.sensor, scene.medium)).collect();
         for axis in 0..3 {
             // Spread evenly: as many below the middle as above, and near both ends.
             let own: Vec<f32> = places.iter().map(|place| place[axis]).collect();
@@ -351,7 +351,7 @@ mod tests {
         let mut scene = Scene::builtin("eight-by-eight-bonded").unwrap();
         let range =
             SensorRange { pitch_over_thickness: [0.5, 2.0], poisson: Some(SensorRange::POISSON), least_side: Some(6) };
-        let window = Window { place: Place::Array, rows: 12, cols: 12 };
+        let window = Window { place: WindowPosition::Array, rows: 12, cols: 12 };
         let signature = Signature { cover: Cover::Range(range), window, ..Signature::of(&scene) };
         let mut refused = |rows: usize, cols: usize, pitch_mm: f64| {
             (scene.sensor.rows, scene.sensor.cols) = (rows, cols);

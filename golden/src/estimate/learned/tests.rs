@@ -3,7 +3,7 @@ use crate::data::generator::draws::{DrawOptions, Draws};
 use crate::estimate::float::Golden;
 use crate::spec::partition::Case;
 use crate::spec::scene::EstimatorKind;
-use crate::spec::window::{Place, Window};
+use crate::spec::window::{Window, WindowPosition};
 use std::ops::ControlFlow::{Break, Continue};
 
 fn scene(name: &str) -> Scene {
@@ -149,7 +149,7 @@ fn several_contacts_need_a_window_around_each() {
     let whole = trained(&scene, 10).bytes;
     scene.partition.case = Case::Contacts;
     let Trained { learned, bytes, .. } = trained(&scene, 10);
-    assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
+    assert_eq!(learned.signature.window, Window { place: WindowPosition::Contact, rows: 9, cols: 11 });
     let fits =
         |scene: &Scene, bytes: &[u8]| Learned::from_bytes(scene, scene.model_estimator(), bytes, "n").map(|_| ());
     assert!(fits(&scene, &whole).is_ok() && fits(&scene, &bytes).is_ok());
@@ -176,7 +176,7 @@ fn as_many_contacts_are_drawn_as_fit() {
 fn a_window_moves_with_its_contact() {
     let scene = scene("sensor-3");
     let Trained { learned, bytes, .. } = trained(&scene, 10);
-    assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
+    assert_eq!(learned.signature.window, Window { place: WindowPosition::Contact, rows: 9, cols: 11 });
     let mut larger = scene.clone();
     (larger.sensor.rows, larger.sensor.cols) = (24, 22);
     let other = Learned::from_bytes(&larger, EstimatorKind::Network, &bytes, "n").unwrap();

@@ -26,7 +26,9 @@ use super::adam::{Adam, OfLayer};
 use super::error::LearnedError;
 use super::frames::NOISE;
 use super::inputs::Inputs;
-use super::network::{through_relu, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, PLACES};
+use super::network::{
+    through_relu, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, OUTPUT_ROWS,
+};
 use super::options::Training;
 use super::signature::Signature;
 use crate::physics::symmetry::folded::EVEN;
@@ -244,7 +246,7 @@ impl<'a> Run<'a> {
             let z = |(frame, (mean, sigma)): (usize, &([f64; 2], [f64; 2]))| {
                 (mean[axis] - f64::from(truth[(axis, frame)])).abs() / sigma[axis]
             };
-            let (_, channel) = PLACES[2 + axis];
+            let (_, channel) = OUTPUT_ROWS[2 + axis];
             let within = share_below(found.iter().enumerate().map(z).collect(), WITHIN);
             if let Some(last) = self.mean.layers.last_mut().filter(|_| within > 0.0) {
                 last.bias[channel] += within.ln() as f32;
@@ -301,7 +303,7 @@ fn slope(outputs: &Mat<f32>, truth: &Mat<f32>, batch: usize) -> (f64, Mat<f32>) 
 /// The slope of the loss in every number of the network, from that in the outputs.
 fn slopes(network: &Network, activations: &[Activation], slope: &Mat<f32>) -> Vec<OfLayer> {
     let mut slopes: Parities = std::array::from_fn(|_| Mat::zeros(OUTPUT_CHANNELS, slope.ncols()));
-    for (output, (parity, channel)) in PLACES.into_iter().enumerate() {
+    for (output, (parity, channel)) in OUTPUT_ROWS.into_iter().enumerate() {
         slopes[parity].row_mut(channel).copy_from(slope.row(output));
     }
     let mut all = Vec::new();
@@ -403,7 +405,7 @@ mod tests {
         for step in 0..training.steps {
             let inputs: Parities = std::array::from_fn(|_| Mat::from_fn(3, 64, |_, _| random.normal() as f32));
             let truth = Mat::from_fn(2, 64, |axis, k| {
-                let odd = &inputs[PLACES[axis].0];
+                let odd = &inputs[OUTPUT_ROWS[axis].0];
                 0.5 * odd[(axis, k)] - 0.25 * odd[(2, k)]
             });
             let activations = network.activations(inputs);

@@ -212,7 +212,7 @@ pub fn count_bits(limit: usize) -> usize {
 
 /// Words of a memory that has one for each of `taxels` taxels of `arrays` arrays: the number of the array stands above that of the
 /// taxel in an address.
-pub fn array_places(arrays: usize, taxels: usize) -> usize {
+pub fn array_words(arrays: usize, taxels: usize) -> usize {
     ((arrays - 1) << count_bits(taxels)) + taxels
 }
 
@@ -252,7 +252,7 @@ impl Resources {
         let quad = |bits: u32| 4 * bits as usize;
         let memory = |holds: Holds, words: usize, bits: usize| Memory::new(holds, [words, bits], board, shallow);
         let input = &scene.input;
-        let places = array_places(scene.hardware.arrays, scene.sensor.taxels());
+        let places = array_words(scene.hardware.arrays, scene.sensor.taxels());
         let mut memories = Vec::new();
         let gains = input.calibration.is_some() || scene.hardware.has_writable_tables();
         let running = RunningZero::of_scene(scene);

@@ -10,7 +10,7 @@
 
 use super::pass::Vector;
 use crate::estimate::learned::LN_SIGMA;
-pub use crate::estimate::learned::PLACES as OUTPUTS;
+pub use crate::estimate::learned::OUTPUT_ROWS as OUTPUTS;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::{Formats, MU_STEPS};
 use crate::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};

@@ -141,10 +141,10 @@ impl Scale {
             return Ok(Scale { tare, table: Some(table), largest });
         };
         let outside = |gain: &f64| !(least..=most).contains(&gain.abs());
-        if let Some(taxel) = table.gain.iter().position(outside) {
-            let of_array = taxel % scene.sensor.taxels();
-            let place = [of_array / scene.sensor.cols, of_array % scene.sensor.cols];
-            return Err(FixedError::TableRange { place, gain: table.gain[taxel], allowed: [least, most] });
+        if let Some(index) = table.gain.iter().position(outside) {
+            let of_array = index % scene.sensor.taxels();
+            let taxel = [of_array / scene.sensor.cols, of_array % scene.sensor.cols];
+            return Err(FixedError::TableRange { taxel, gain: table.gain[index], allowed: [least, most] });
         }
         Ok(Scale { tare, table: Some(table), largest })
     }

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::physics::symmetry::parity::hadamard;
     use crate::spec::scene::Scene;
-    use crate::spec::window::Place;
+    use crate::spec::window::WindowPosition;
 
     /// A window in the corner: what is beyond the array is masked, its own loudest code sets the shift.
     #[test]
@@ -89,7 +89,7 @@ mod tests {
         let formats = model.formats();
         let sensor = Sensor { rows: 4, cols: 4, ..model.scene.sensor.clone() };
         let codes: Vec<i32> = (0..16).map(|taxel| if taxel < 8 { 100 + taxel } else { 100_000 }).collect();
-        let small = Window { place: Place::Contact, rows: 3, cols: 3 };
+        let small = Window { place: WindowPosition::Contact, rows: 3, cols: 3 };
         let array = Array { sensor: &sensor, codes: &codes, dead: &[1], floor: 103 };
         let found = window(formats, &small, &array, [0, 0], &|taxel| taxel == 4);
         // Rows −1 to 1: codes 100, dead, 104, 105 in the lower right; all shifted to the full width.

@@ -48,7 +48,7 @@ use super::{
 use crate::spec::partition::Case;
 use crate::spec::quads::Quads;
 use crate::spec::scene::MAX_DEGREE;
-use crate::spec::window::{Place, Window};
+use crate::spec::window::{Window, WindowPosition};
 
 /// A value and whether it is rejected.
 pub(super) struct Rule {
@@ -283,7 +283,7 @@ impl Scene {
                 "0, with the estimator network",
             ),
             rule(
-                self.partition.case == Case::WHOLE && Window::of(sensor).place != Place::Array,
+                self.partition.case == Case::WHOLE && Window::of(sensor).place != WindowPosition::Array,
                 "sensor.rows",
                 sensor.rows.to_string(),
                 "with sensor.cols up to 144 taxels, with the estimator network",

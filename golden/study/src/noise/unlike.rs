@@ -32,7 +32,7 @@ use dermis_golden::estimate::misfit::Misfit;
 use dermis_golden::random::Random;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
-use dermis_golden::spec::window::Place;
+use dermis_golden::spec::window::WindowPosition;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -180,8 +180,8 @@ impl Kind {
 impl Like<'_> {
     fn new(scene: &Scene, seed: u64) -> Like<'_> {
         let most = match Signature::of(scene).window.place {
-            Place::Array => 1,
-            Place::Contact => 4,
+            WindowPosition::Array => 1,
+            WindowPosition::Contact => 4,
         };
         Like { scene, seed, most }
     }

@@ -83,7 +83,7 @@ impl AdaptiveKernel<'_> {
     /// The kernel.
     pub fn build<'k>(&self, k: &'k Builder, io: MeanPorts<'k>) {
         let kept = self.mean.word_bits(self.bits as u32) as usize;
-        let places = self.arrays.places(self.taxels());
+        let places = self.arrays.words(self.taxels());
         let means = k.memory("means", places, kept, Contents::Undefined).holds(Holds::Average);
         let (valid, final_out) = (io.valid_out.state(io.rst, 0), k.register("final_out", Type::unsigned(1)));
         let moves = k.wire("moves", !*valid | io.ready);
@@ -166,7 +166,7 @@ impl AdaptiveKernel<'_> {
         });
         k.when(left, || full.set(k.constant(1, 0)));
         let read_array = if self.arrays.bits > 0 { sending.mux(array, io.array) } else { array };
-        let place = self.arrays.place(k, read_array, sending.mux(*sent, *taxel));
+        let place = self.arrays.address(k, read_array, sending.mux(*sent, *taxel));
         let count = wholes.of(array);
         let chosen = k.register("chosen", Type::unsigned(count_bits(self.mean.windows.len())));
         let beat = self.hold(k, io, takes, [*taxel, place, gain, odd]);

@@ -1,6 +1,6 @@
 //! Several arrays on one engine: which array a frame is of, and a state for each array.
 
-use dermis_golden::fixed::plan::resources::array_places;
+use dermis_golden::fixed::plan::resources::array_words;
 use dermis_golden::fixed::Plan;
 
 use crate::block;
@@ -26,12 +26,12 @@ impl Arrays {
     }
 
     /// Words of a memory with one for each of `taxels` taxels of each array.
-    pub fn places(self, taxels: usize) -> usize {
-        array_places(self.count(), taxels)
+    pub fn words(self, taxels: usize) -> usize {
+        array_words(self.count(), taxels)
     }
 
     /// Address in that memory of taxel `taxel` of array `array`.
-    pub(super) fn place<'k>(self, k: &'k Builder, array: Expr<'k>, taxel: Expr<'k>) -> Expr<'k> {
+    pub(super) fn address<'k>(self, k: &'k Builder, array: Expr<'k>, taxel: Expr<'k>) -> Expr<'k> {
         match self.bits {
             0 => taxel,
             _ => k.wire("place", array.concat(taxel)),
@@ -39,10 +39,10 @@ impl Arrays {
     }
 
     /// The array of an address.
-    pub(super) fn of_place<'k>(self, place: Expr<'k>) -> Expr<'k> {
+    pub(super) fn array_of<'k>(self, address: Expr<'k>) -> Expr<'k> {
         match self.bits {
-            0 => place,
-            bits => place.slice(place.bits() - bits, bits),
+            0 => address,
+            bits => address.slice(address.bits() - bits, bits),
         }
     }
 

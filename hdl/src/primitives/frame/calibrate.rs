@@ -84,7 +84,7 @@ impl Calibrate {
             taxel if taxel < self.taxels => word((place >> count_bits(self.taxels)) * self.taxels + taxel),
             _ => vec![0],
         };
-        let places = self.arrays.places(self.taxels);
+        let places = self.arrays.words(self.taxels);
         let words = (0..places).map(filled).collect();
         let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words };
         let entries = k.memory("entries", places, bits + gain_bits, contents).holds(Holds::Calibration);
@@ -106,7 +106,7 @@ impl Calibrate {
         let entries = self.entries(k, &io);
         let steps = 2 + if self.gain.is_some() { 2 } else { 0 } + if self.running.is_some() { 2 } else { 0 };
         let taxel = k.state("taxel", Type::unsigned(io.write_taxel.bits()), rst, 0);
-        let place = self.arrays.place(k, io.s_axis.array, *taxel);
+        let place = self.arrays.address(k, io.s_axis.array, *taxel);
         let entry = entries.map(|entries| {
             let entry = k.register("entry", Type::unsigned(bits + gain_bits));
             (entry, entries)

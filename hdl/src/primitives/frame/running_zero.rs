@@ -62,10 +62,10 @@ pub(super) fn follow<'k>(
     let (limit, most) = (i64::from(zero.limit), i64::from(zero.limit) << zero.average);
     let bit = Type::unsigned(1);
     let drifts =
-        k.memory("drifts", arrays.places(taxels), moved_bits + step_bits, Contents::Undefined).holds(Holds::Drift);
+        k.memory("drifts", arrays.words(taxels), moved_bits + step_bits, Contents::Undefined).holds(Holds::Drift);
 
     k.comment("The drift as it was stored, 0 in the first frame after a reset.");
-    let array = arrays.of_place(place);
+    let array = arrays.array_of(place);
     let firsts = arrays.state(k, "first", bit, resets, 1);
     let word = k.register("word", Type::unsigned(moved_bits + step_bits));
     let held = |name: &str, value: Expr<'k>| {
@@ -110,7 +110,7 @@ pub(super) fn follow<'k>(
     let [pressed, limiting] = ["pressed", "limiting"].map(|name| k.state(name, bit, rst, 0));
     k.comment("Nothing pressed in the frame before; a zero was at its limit in it.");
     let [all_rest, all_limited] = ["rests", "limited"].map(|name| arrays.state(k, name, bit, resets, 0));
-    let array = arrays.of_place(place);
+    let array = arrays.array_of(place);
     let [rests, limited] = [&all_rest, &all_limited].map(|state| state.of(array));
     let either = |go: Expr<'k>, stay: Expr<'k>| rests.mux(go, stay);
     let difference = k.wire("rest", either(rest_go, rest_stay));

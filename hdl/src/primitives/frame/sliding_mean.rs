@@ -63,7 +63,7 @@ impl SlidingMean {
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
         let place_type = Type::unsigned(index.bits + self.arrays.bits);
         let (shift, count) = (Type::unsigned(count_bits(power + 1)), Type::unsigned(power + 1));
-        let means = k.memory("means", self.arrays.places(self.taxels), wide, Contents::Undefined).holds(Holds::Average);
+        let means = k.memory("means", self.arrays.words(self.taxels), wide, Contents::Undefined).holds(Holds::Average);
         k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
         let taxel = k.state("taxel", index, rst, 0);
         let gains = self.arrays.state(k, "gain", shift, resets, 0);
@@ -73,7 +73,7 @@ impl SlidingMean {
         let [held, added] = ["held", "added"].map(|name| k.state(name, bit, rst, 0));
         let valid = valid_out.state(rst, 0);
         let (word, sofar) = (k.register("word", Type::signed(self.bits)), k.register("sofar", Type::signed(wide)));
-        let place = self.arrays.place(k, array, *taxel);
+        let place = self.arrays.address(k, array, *taxel);
         let [held_taxel, added_taxel] = ["held_taxel", "added_taxel"].map(|name| k.register(name, place_type));
         let held_gain = k.register("held_gain", shift);
         let held_odd = k.register("held_odd", bit);
@@ -133,7 +133,7 @@ impl SlidingMean {
         means.write(moves & *added, *added_taxel, result);
         if self.arrays.bits > 0 {
             let array_out = array_out.register();
-            k.when(moves, || array_out.set(self.arrays.of_place(*added_taxel)));
+            k.when(moves, || array_out.set(self.arrays.array_of(*added_taxel)));
         }
     }
 }

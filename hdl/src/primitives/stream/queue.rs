@@ -34,8 +34,8 @@ block! {
 }
 
 const PLACE_BITS: usize = 4;
-/// Places in the queue: the depth of one distributed RAM cell.
-pub const PLACES: usize = 1 << PLACE_BITS;
+/// Beats that fit the queue: the depth of one distributed RAM cell.
+pub const CAPACITY: usize = 1 << PLACE_BITS;
 /// Cycles from `write` to `m_axis_tvalid`, if the queue is empty.
 pub const LATENCY: usize = 2;
 
@@ -49,7 +49,7 @@ impl Queue {
 impl Block for Queue {
     fn build<'k>(&self, k: &'k Builder, io: QueuePorts<Inside<'k>>) {
         let count = Type::unsigned(PLACE_BITS + 1);
-        let places = k.memory("places", PLACES, self.bits + 1, Contents::Undefined);
+        let places = k.memory("places", CAPACITY, self.bits + 1, Contents::Undefined);
         let [written, read, reserved] = ["written", "read", "reserved"].map(|name| k.state(name, count, io.rst, 0));
         let room = io.room.state(io.rst, 1);
         let valid = io.m_axis.valid.state(io.rst, 0);
@@ -71,7 +71,7 @@ impl Block for Queue {
         });
         k.when(io.write, || written.set(written.plus(1)));
         reserved.set(k.wire("now_reserved", io.reserve.mux(grown, kept)));
-        room.set(io.reserve.mux(!grown.is(PLACES as u64), !kept.is(PLACES as u64)));
+        room.set(io.reserve.mux(!grown.is(CAPACITY as u64), !kept.is(CAPACITY as u64)));
         k.when(moves, || valid.set(waits));
     }
 }
@@ -100,7 +100,7 @@ pub(crate) mod tests {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             let bit = |bit: bool| self.reset.then(|| Word::from(bit));
             vec![
-                bit(self.reserved < PLACES),
+                bit(self.reserved < CAPACITY),
                 bit(self.offered.is_some()),
                 self.offered.map(|(_, last)| Word::from(last)),
                 self.offered.map(|(word, _)| word),
@@ -135,7 +135,7 @@ pub(crate) mod tests {
                 speed = [(); 3].map(|()| random.u8(1..8));
             }
             let rst = cycle < 2 || random.u16(..200) == 0;
-            let reserve = !rst && list.reserved < PLACES && random.u8(..8) < speed[0];
+            let reserve = !rst && list.reserved < CAPACITY && random.u8(..8) < speed[0];
             let write = !rst && unwritten > 0 && random.u8(..8) < speed[1];
             let mut word = Word::default();
             word.set_limbs(&[random.u64(..), random.u64(..64)]);

@@ -6,7 +6,7 @@ use dermis_golden::fixed::stages::receive::Received;
 use dermis_golden::fixed::stages::window::{cycles, window, Array, WindowWords};
 use dermis_golden::fixed::words::network::MASKED;
 use dermis_golden::fixed::Plan;
-use dermis_golden::spec::window::Place;
+use dermis_golden::spec::window::WindowPosition;
 
 use super::*;
 use crate::language::testbench::{check, check_with_defects, random_word, subject_of, Reference, Subject};
@@ -19,7 +19,7 @@ fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, mor
     let change = |plan: &mut Plan| {
         (plan.scene.partition.max_contacts, plan.own_mut().noise_floor) = (contacts, 100);
         let segmenter = Segmenter::new(&plan.scene.sensor, 1.0);
-        let window = window::Window { place: Place::Contact, rows: own[0], cols: own[1] };
+        let window = window::Window { place: WindowPosition::Contact, rows: own[0], cols: own[1] };
         plan.by_contact = Some(ContactPlan { segmenter, window });
     };
     model(rows, cols, more).with_changed_plan(change).unwrap()

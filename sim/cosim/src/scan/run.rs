@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::array::{volts, Array, Fault, NOISE_LSB};
 use super::converters::Converters;
 use super::device::VerilatedScan;
-use crate::findings::{Findings, FrameComparison, Place};
+use crate::findings::{Findings, FrameComparison, WordLocation};
 use crate::simulator::Simulator;
 use dermis_flow::progress::Progress;
 
@@ -212,11 +212,11 @@ fn compare(label: &str, model: &Model, expected: &[Expected], observed: &Observe
     let of_scan = |number: usize| FrameComparison::new(label, format!("scan {number}"), number);
     // First in the list: a broken time explains what is wrong after it.
     let mut comparison = of_scan(0);
-    let place = Place { stage: "converter", ..Place::default() };
-    violations.iter().for_each(|text| comparison.add_violation(place, text.clone()));
+    let location = WordLocation { stage: "converter", ..WordLocation::default() };
+    violations.iter().for_each(|text| comparison.add_violation(location, text.clone()));
     if *left > 0 {
-        let place = Place { stage: "load", ..Place::default() };
-        comparison.add_violation(place, format!("{left} bytes of the image are not taken"));
+        let location = WordLocation { stage: "load", ..WordLocation::default() };
+        comparison.add_violation(location, format!("{left} bytes of the image are not taken"));
     }
     findings.extend(comparison.finish());
     findings.count += violation_count - violations.len();
@@ -227,17 +227,21 @@ fn compare(label: &str, model: &Model, expected: &[Expected], observed: &Observe
         for (index, &wanted) in own.scanned.codes.iter().enumerate() {
             let taxel = Some([index / cols, index % cols]);
             let got = code.next().map(|code| vec![i64::from(*code)]);
-            comparison.compare(Place { stage: "scan", index, taxel, cycle: None }, Some(vec![wanted.into()]), got);
+            comparison.compare(
+                WordLocation { stage: "scan", index, taxel, cycle: None },
+                Some(vec![wanted.into()]),
+                got,
+            );
         }
         for (index, wanted) in own.beats.iter().enumerate() {
             let got = beat.next().map(|beat| beat.map(i64::from).to_vec());
-            let place = Place { stage: "beats", index, ..Place::default() };
-            comparison.compare(place, Some(wanted.map(i64::from).to_vec()), got);
+            let location = WordLocation { stage: "beats", index, ..WordLocation::default() };
+            comparison.compare(location, Some(wanted.map(i64::from).to_vec()), got);
         }
         end += own.beats.len();
         if ends.get(nth) != Some(&end) {
-            let place = Place { stage: "beats", ..Place::default() };
-            comparison.add_violation(place, format!("tlast is not on beat {end} of the run"));
+            let location = WordLocation { stage: "beats", ..WordLocation::default() };
+            comparison.add_violation(location, format!("tlast is not on beat {end} of the run"));
         }
         findings.extend(comparison.finish());
     }

@@ -7,7 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::quads::Quads;
 use dermis_golden::wire::link::{payloads, Counters, Identity, ANSWER};
 use dermis_hdl::language::Change;
-use dermis_hdl::primitives::QUEUE_PLACES;
+use dermis_hdl::primitives::QUEUE_CAPACITY;
 use dermis_tests::{variants, with_network};
 
 use super::prover::{number, Hardware, Proof};
@@ -80,11 +80,11 @@ fn forces_that_wait_leave_in_order() {
         let queue = "forces__leaving";
         let defects = vec![
             // One place too many is promised; an offered word changes; words leave in the wrong order.
-            Change::value(queue, "room", |k| !k.named("now_reserved").is(QUEUE_PLACES as u64 + 1)),
+            Change::value(queue, "room", |k| !k.named("now_reserved").is(QUEUE_CAPACITY as u64 + 1)),
             Change::within(queue, "m_axis_tdata", |k| [k.named("moves") & k.named("waits"), k.named("waits")]),
             Change::value(queue, "head", |k| k.array("places").read(!k.named("read").low(4))),
         ];
-        let given = vec![("PLACES", number(QUEUE_PLACES)), ("BIT", number(bit))];
+        let given = vec![("PLACES", number(QUEUE_CAPACITY)), ("BIT", number(bit))];
         let hardware = Hardware::Engine(&model);
         Proof { hardware, property: "queue.v", given, defects, open_products: false }.run();
     }
