@@ -181,16 +181,18 @@ impl Wrapper {
 /// # Errors
 /// [`HdlError::Check`] if one is missing, or not of its size.
 fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, HdlError> {
-    let all: Vec<(&str, &language::Memory)> =
-        hierarchy.kernels().flat_map(|(block, kernel)| kernel.memories().iter().map(move |own| (block, own))).collect();
+    let memories: Vec<(&str, &language::Memory)> = hierarchy
+        .kernels()
+        .flat_map(|(block, kernel)| kernel.memories().iter().map(move |memory| (block, memory)))
+        .collect();
     let place = |planned: &Memory| {
         let label = planned.holds.to_string();
-        let is = |own: &language::Memory| {
-            own.label.as_ref() == Some(&label) && (own.words, own.bits) == (planned.words, planned.bits)
+        let is = |memory: &language::Memory| {
+            memory.label.as_ref() == Some(&label) && (memory.words, memory.bits) == (planned.words, planned.bits)
         };
-        let found = all.iter().find(|(_, own)| is(own));
+        let found = memories.iter().find(|(_, memory)| is(memory));
         let missing = || HdlError::Check(format!("the model's memory {planned:?} is not in the hardware"));
-        found.map(|(block, own)| PlacedMemory::new(block, &own.name, planned)).ok_or_else(missing)
+        found.map(|(block, memory)| PlacedMemory::new(block, &memory.name, planned)).ok_or_else(missing)
     };
     model.resources.memories.iter().map(place).collect()
 }
@@ -341,7 +343,7 @@ fn manifest(
             "mean": model.prepare.mean.name(),
             "full_scale_readings": full_scale.map(|full_scale| full_scale * model.prepare.reading_per_MPa),
             "full_scale_MPa": full_scale,
-            "noise_floor_codes": model.of_each_array(|own| own.noise_floor.into()),
+            "noise_floor_codes": model.of_each_array(|array| array.noise_floor.into()),
         },
         "output": {
             "force_beats": model.force_beats(),
@@ -350,7 +352,7 @@ fn manifest(
             // Without a full scale, a force LSB is this many N per MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
-            "threshold_lsb": model.of_each_array(|own| own.threshold.into()),
+            "threshold_lsb": model.of_each_array(|array| array.threshold.into()),
             "flags": status_masks(model),
             "status": status_layout(model),
         },
@@ -364,7 +366,7 @@ fn manifest(
         "resources": resources(usage, memories),
         "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),
         "frame_interval": frame_interval(model, model.first()),
-        "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),
+        "cases": model.chooses().then(|| model.cases().iter().map(|plan| case(model, plan)).collect::<Vec<_>>()),
         "dropped": model.chooses().then_some(dropped),
     })
 }

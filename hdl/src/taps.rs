@@ -109,12 +109,12 @@ fn parallel(model: &Model) -> Vec<Stream> {
     let of = Stream::of;
     let all = [
         (true, of("receive", &["receive__accept"], &[signed("receive__taken_word")])),
-        (model.chooses(), of("choose", &["begin_frame"], &[unsigned("receive__which")]).field_bits(CHOICE_FIELD)),
+        (model.chooses(), of("choose", &["begin_frame"], &[unsigned("receive__case_index")]).field_bits(CHOICE_FIELD)),
         (true, of("normalise", &["fold__normalised_valid"], &[signed("normalise__shifted")]).fields(&TAXELS)),
         (true, of("fold", &["fold__folded_valid"], &[signed("fold__folded")]).fields(&PARITIES)),
         (
             true,
-            of("instruction", &["pass__issued"], &[unsigned("pass__which"), unsigned("pass__step")])
+            of("instruction", &["pass__issued"], &[unsigned("pass__section"), unsigned("pass__step")])
                 .field_bits(INSTRUCTION_FIELD),
         ),
         (true, of("pass", &["pass__quad_valid"], &[signed("pass__quad")]).fields(&PARITIES)),

@@ -76,8 +76,8 @@ impl OverShapes {
             candidates.push(Candidate::Scene);
         }
         candidates.extend(self.hardware.unwrap_or(false).then_some(Candidate::Hardware));
-        let (draws, levels, told) = (basic.draws, basic.levels, self.stated.unwrap_or(true));
-        Ok(ShapeStudy { draws, levels, options, told, candidates, ..ShapeStudy::default() })
+        let (draws, levels, noise_stated) = (basic.draws, basic.levels, self.stated.unwrap_or(true));
+        Ok(ShapeStudy { draws, levels, options, noise_stated, candidates, ..ShapeStudy::default() })
     }
 }
 

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use dermis_golden::data::recording::message::{DiagnosticStatus, KeyValue};
 use dermis_golden::result::flags::Flag;
-use dermis_host::stream::Answer;
+use dermis_host::stream::StreamAnswer;
 
 /// Time between reports of all patches.
 pub const PERIOD: Duration = Duration::from_secs(1);
@@ -136,7 +136,7 @@ impl PatchState {
     }
 
     /// Counts a result.
-    pub fn answer(&self, answer: &Answer) {
+    pub fn answer(&self, answer: &StreamAnswer) {
         let lag = Duration::try_from_secs_f64(answer.answered_s - answer.received_s).unwrap_or_default();
         let mut figures = self.figures();
         figures.counters.results += 1;

@@ -17,10 +17,10 @@ use crate::patches::PatchFile;
 const BOARD_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// An engine that several patches may have.
-pub type Engine = Arc<CheckedEngine<SharedEngine>>;
+pub type PatchEngine = Arc<CheckedEngine<SharedEngine>>;
 
 /// The engines of the patches; patches with the same scene and estimator have one.
-pub struct Engines(Vec<Engine>);
+pub struct Engines(Vec<PatchEngine>);
 
 impl Engines {
     /// Builds them, one for each patch.
@@ -28,7 +28,7 @@ impl Engines {
     /// # Errors
     /// A scene that its engine refuses, with the patch.
     pub fn build(file: &PatchFile) -> Result<Engines> {
-        let mut built: BTreeMap<(String, Option<String>, EngineName), Engine> = BTreeMap::new();
+        let mut built: BTreeMap<(String, Option<String>, EngineName), PatchEngine> = BTreeMap::new();
         let mut all = Vec::new();
         for (index, patch) in file.patches.iter().enumerate() {
             if let Some(port) = &patch.fields.board {
@@ -49,7 +49,7 @@ impl Engines {
     }
 
     /// That of each patch, in the order of the file.
-    pub fn each(&self) -> &[Engine] {
+    pub fn each(&self) -> &[PatchEngine] {
         &self.0
     }
 }

@@ -13,7 +13,7 @@ use dermis_golden::result::reconstruct::{ContactTrack, FoundContact, Reconstruct
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_host::recording::{header, torque, Arrows, Points, METRES};
-use dermis_host::stream::Answer;
+use dermis_host::stream::StreamAnswer;
 
 use crate::patches::{Patch, Pose};
 
@@ -38,7 +38,7 @@ impl Messages {
         Messages { name, frame_id, sensor: sensor.clone(), arrows: Arrows::of(&patch.scene) }
     }
 
-    fn header(&self, answer: &Answer) -> Header {
+    fn header(&self, answer: &StreamAnswer) -> Header {
         header(&self.frame_id, answer.time_ns())
     }
 
@@ -46,7 +46,7 @@ impl Messages {
     ///
     /// # Errors
     /// A name that CDR cannot represent, as of all messages.
-    pub fn wrench(&self, answer: &Answer) -> Result<Vec<u8>> {
+    pub fn wrench(&self, answer: &StreamAnswer) -> Result<Vec<u8>> {
         let wrench = Wrench { force: answer.result.resultant_N, torque: whole_torque(answer.result) };
         cdr(&WrenchStamped { header: self.header(answer), wrench })
     }
@@ -55,7 +55,7 @@ impl Messages {
     ///
     /// # Errors
     /// As [`Messages::wrench`].
-    pub fn contacts(&self, answer: &Answer) -> Result<Vec<u8>> {
+    pub fn contacts(&self, answer: &StreamAnswer) -> Result<Vec<u8>> {
         let result = answer.result;
         let found = result.all_contacts();
         let placed = found.iter().filter_map(|own| Some((own, own.centre_mm?)));
@@ -74,7 +74,7 @@ impl Messages {
     ///
     /// # Errors
     /// As [`Messages::wrench`].
-    pub fn arrows(&self, answer: &Answer) -> Result<Vec<u8>> {
+    pub fn arrows(&self, answer: &StreamAnswer) -> Result<Vec<u8>> {
         let contacts = answer.result.all_contacts();
         cdr(&self.arrows.markers(&self.sensor, answer.result, &contacts, &self.header(answer)))
     }
@@ -83,7 +83,7 @@ impl Messages {
     ///
     /// # Errors
     /// As [`Messages::wrench`].
-    pub fn forces(&self, answer: &Answer) -> Result<Option<Vec<u8>>> {
+    pub fn forces(&self, answer: &StreamAnswer) -> Result<Option<Vec<u8>>> {
         if answer.result.forces_N.fz.is_empty() {
             return Ok(None);
         }
@@ -95,7 +95,7 @@ impl Messages {
     ///
     /// # Errors
     /// As [`Messages::wrench`].
-    pub fn stress(&self, answer: &Answer) -> Result<Option<Vec<u8>>> {
+    pub fn stress(&self, answer: &StreamAnswer) -> Result<Option<Vec<u8>>> {
         let shape = [self.sensor.rows, self.sensor.cols];
         let Some(frame) = answer.frames.last() else { return Ok(None) };
         let [_, (_, single)] = frame_messages(shape, &self.header(answer), &frame.readings())?;

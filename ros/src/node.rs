@@ -13,12 +13,12 @@ use dermis_golden::data::text::Stated;
 use dermis_golden::engine::CheckPace;
 use dermis_host::recording::header;
 use dermis_host::stream::{
-    run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
+    run_together, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamAnswer, StreamOptions, ZeroRequest,
 };
 
 use crate::carrier::{Carrier, DdsNode, Publisher, Subscription, ZenohNode};
 use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
-use crate::engines::{Engine, Engines};
+use crate::engines::{Engines, PatchEngine};
 use crate::messages::{self, Messages};
 use crate::patches::{CarrierName, NodeFields, Patch, PatchFile};
 use crate::source::Reopened;
@@ -54,7 +54,7 @@ impl Outlet {
         let topics = PatchTopics::new(&file.node.namespace, patch);
         let optional = |topic: &Option<topics::Topic>| topic.as_ref().map(|own| carrier.publisher(own)).transpose();
         let zero = ZeroRequest::default();
-        let asked = zero.clone();
+        let zero_request = zero.clone();
         let scene = carrier.publisher(&topics.scene)?;
         scene.put(messages::scene(patch)?)?;
         Ok(Outlet {
@@ -66,14 +66,14 @@ impl Outlet {
             forces: optional(&topics.forces)?,
             stress: optional(&topics.stress)?,
             _scene: scene,
-            _tare: carrier.subscription(&topics.tare, Box::new(move || asked.now()))?,
+            _tare: carrier.subscription(&topics.tare, Box::new(move || zero_request.now()))?,
             zero,
             period: file.node.rate_Hz.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate)),
         })
     }
 
     /// Publishes a result; what is large only while there is a subscriber.
-    fn publish(&self, answer: &Answer) -> Result<()> {
+    fn publish(&self, answer: &StreamAnswer) -> Result<()> {
         self.wrench.put(self.messages.wrench(answer)?)?;
         self.contacts.put(self.messages.contacts(answer)?)?;
         if self.arrows.is_wanted() {
@@ -92,9 +92,9 @@ impl Outlet {
 }
 
 /// A patch of a worker.
-struct Own<'a> {
+struct WorkerPatch<'a> {
     patch: &'a Patch,
-    engine: &'a Engine,
+    engine: &'a PatchEngine,
     outlet: &'a Outlet,
 }
 
@@ -144,19 +144,20 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
             stop.now();
         });
     }
-    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(engines.each(), &outlets))
-        .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
+    let all: Vec<WorkerPatch> = std::iter::zip(&file.patches, std::iter::zip(engines.each(), &outlets))
+        .map(|(patch, (engine, outlet))| WorkerPatch { patch, engine, outlet })
         .collect();
     let share = (threads.max(1) as f64 / patches as f64).min(1.0);
     std::thread::scope(|scope| {
         let reporting = scope.spawn(|| report(&outlets, &changes, reports.as_ref(), &running));
         // A board keeps its worker waiting: it has one of its own.
-        let (boards, computed): (Vec<&Own>, Vec<&Own>) = all.iter().partition(|own| own.patch.fields.board.is_some());
+        let (boards, computed): (Vec<&WorkerPatch>, Vec<&WorkerPatch>) =
+            all.iter().partition(|member| member.patch.fields.board.is_some());
         let divided = (0..threads).map(|worker| computed.iter().copied().skip(worker).step_by(threads).collect());
-        let groups: Vec<Vec<&Own>> = divided.chain(boards.iter().map(|own| vec![*own])).collect();
+        let groups: Vec<Vec<&WorkerPatch>> = divided.chain(boards.iter().map(|member| vec![*member])).collect();
         let stop = &stop;
         let workers: Vec<_> =
-            groups.into_iter().map(|own| scope.spawn(move || work(stop, file, &own, share))).collect();
+            groups.into_iter().map(|group| scope.spawn(move || work(stop, file, &group, share))).collect();
         let failed = workers.into_iter().filter_map(|worker| worker.join().err()).count();
         running.store(false, Ordering::Release);
         let reported = reporting.join().map_err(|_| anyhow!("the thread of the diagnostics has ended"));
@@ -183,11 +184,11 @@ fn measured(file: &PatchFile, outlets: &[Outlet], time: Duration) -> String {
 }
 
 /// Answers the streams of a worker until they have ended.
-fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
+fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a WorkerPatch<'a>], share: f64) {
     let options =
         StreamOptions { queue: file.node.queue, policy: Policy::Latest, live: true, layout: Stated::default() };
-    let member = |own: &&'a Own<'a>| {
-        let (patch, engine) = (own.patch, own.engine.engine());
+    let member = |member: &&'a WorkerPatch<'a>| {
+        let (patch, engine) = (member.patch, member.engine.engine());
         let pace = match patch.fields.check_every {
             Some(period) => CheckPace::Every(period),
             // A core of its own, beside which there is time.
@@ -199,14 +200,14 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
             None => Faster::of_stream(&patch.scene, patch.engine, None),
         };
         let estimators = Estimators::new(engine, faster, pace, None, Clock::default()).with_share(share);
-        let source = Reopened::new(patch, Arc::clone(&own.outlet.state));
+        let source = Reopened::new(patch, Arc::clone(&member.outlet.state));
         let input = (Box::new(source) as Box<dyn std::io::Read + Send>, patch.fields.source.clone());
-        Member { estimators, input, options, zero: own.outlet.zero.clone() }
+        Member { estimators, input, options, zero: member.outlet.zero.clone() }
     };
     let members: Vec<Member> = all.iter().map(member).collect();
     let mut published: Vec<Option<Instant>> = vec![None; all.len()];
     let ends = run_together(stop, members, &mut |index, outcome| {
-        let Own { patch, outlet, .. } = all[index];
+        let WorkerPatch { patch, outlet, .. } = all[index];
         let name = &patch.fields.name;
         match outcome {
             Outcome::Note(text) => say!("{name}: {text}"),
@@ -227,13 +228,13 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
         }
         Ok(())
     });
-    for (own, end) in std::iter::zip(all, ends) {
-        let name = &own.patch.fields.name;
+    for (member, end) in std::iter::zip(all, ends) {
+        let name = &member.patch.fields.name;
         match end {
             Ok(counts) => say!("{name}: {} results; {counts}", counts.answered),
             Err(error) => {
                 say!("{name}: {error:#}");
-                own.outlet.state.ended(Some(format!("{error:#}")));
+                member.outlet.state.ended(Some(format!("{error:#}")));
             }
         }
     }

@@ -20,7 +20,7 @@ use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
-use dermis_host::stream::{Answer, Outcome};
+use dermis_host::stream::{Outcome, StreamAnswer};
 use dermis_sim::live::{Newest, Server, Show};
 use serde_json::json;
 
@@ -63,7 +63,7 @@ fn main() -> anyhow::Result<()> {
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
     let frames = std::slice::from_ref(frame);
     let (estimator, estimator_change) = ("search", None);
-    let answer = Answer {
+    let answer = StreamAnswer {
         sequence,
         line,
         received_s,

@@ -7,7 +7,7 @@ module proof(input clk, input again, input valid);
   wire [@FINISHED@-1:0] finished;
   wire keep;
   @TOP@__pass__operand_writer block(
-    .clk(clk), .which(1'b0), .clear(again || !started), .valid(valid), .address(address), .keep(keep),
+    .clk(clk), .section(1'b0), .clear(again || !started), .valid(valid), .address(address), .keep(keep),
     .finished(finished)
   );
   reg [7:0] kept;

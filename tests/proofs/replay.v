@@ -29,7 +29,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   wire [@SHIFTS@-1:0] shift;
   wire [15:0] saturations;
   @TOP@__rescale block(
-    .clk(clk), .rst(rst), .which(1'b0), .start(start && !rst), .quad(quad), .quad_valid(quad_valid && !rst),
+    .clk(clk), .rst(rst), .case_index(1'b0), .start(start && !rst), .quad(quad), .quad_valid(quad_valid && !rst),
     .quad_soon(quad_soon && !rst), .words(words), .words_valid(words_valid), .operands(operands),
     .operands_valid(operands_valid), .shift(shift), .saturations(saturations)
   );

@@ -37,7 +37,7 @@ pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
 
 /// Sign, condition and centroids of one subarray's codes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Received {
+pub struct SubarrayStats {
     /// Largest |code| in LSBs.
     pub max_code: i32,
     /// Some code is above the floor.
@@ -71,7 +71,7 @@ impl Moments {
 }
 
 /// Evaluates the codes of subarray `part` of `sensor`; `floor` is the noise floor in codes, ≥ 0.
-pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> Received {
+pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> SubarrayStats {
     let (mut compression, mut tension) = (Moments::default(), Moments::default());
     let mut max_code = 0;
     let half_pitches = |index: usize, count: usize| 2 * index as i64 - (count as i64 - 1);
@@ -89,7 +89,7 @@ pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, cond
     }
     let (positive, negative) = (compression.weight != 0, tension.weight != 0);
     let loaded = max_code > floor;
-    Received {
+    SubarrayStats {
         max_code,
         positive,
         negative,

@@ -67,10 +67,13 @@ fn a_press_over_zeros_that_moved_is_not_lost() {
                 let result = checked.result(std::slice::from_ref(&moved), true).unwrap();
                 let normal_N = result.resultant_N[2];
                 let is_near = (normal_N / true_N - 1.0).abs() < 0.15;
-                let is_told = failed.iter().any(|flag| result.flags.contains(flag));
+                let is_flagged = failed.iter().any(|flag| result.flags.contains(flag));
                 let what =
                     format!("frame {number}, engine {k}, {share}: {normal_N} N of {true_N} N, {:?}", result.flags);
-                assert!(normal_N > 0.0 && !result.flags.contains(&Flag::NoContact) && (is_near || is_told), "{what}");
+                assert!(
+                    normal_N > 0.0 && !result.flags.contains(&Flag::NoContact) && (is_near || is_flagged),
+                    "{what}"
+                );
             }
         }
     }

@@ -49,18 +49,18 @@ impl Tracks {
         self.all.retain(|track| now - track.found <= GAP);
         let found = result.all_contacts();
         let placed: Vec<(&FoundContact, [f64; 2])> =
-            found.iter().filter_map(|own| Some((own, own.centre_mm?))).collect();
+            found.iter().filter_map(|contact| Some((contact, contact.centre_mm?))).collect();
         let away = |track: &Track, [x, y]: [f64; 2]| (track.shown.centre_mm[0] - x).hypot(track.shown.centre_mm[1] - y);
         let mut pairs: Vec<(f64, usize, usize)> = (0..self.all.len())
-            .flat_map(|track| (0..placed.len()).map(move |own| (track, own)))
-            .map(|(track, own)| (away(&self.all[track], placed[own].1), track, own))
+            .flat_map(|track| (0..placed.len()).map(move |contact| (track, contact)))
+            .map(|(track, contact)| (away(&self.all[track], placed[contact].1), track, contact))
             .filter(|(away_mm, ..)| *away_mm <= reach_mm)
             .collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut of_contact: Vec<Option<usize>> = vec![None; placed.len()];
-        for (_, track, own) in pairs {
-            if of_contact[own].is_none() && !of_contact.contains(&Some(track)) {
-                of_contact[own] = Some(track);
+        for (_, track, contact) in pairs {
+            if of_contact[contact].is_none() && !of_contact.contains(&Some(track)) {
+                of_contact[contact] = Some(track);
             }
         }
         let moving = result.extra.template.map(|template| !template.held);
@@ -95,24 +95,25 @@ impl Track {
     }
 
     fn next(&mut self, contact: &FoundContact, centre_mm: [f64; 2], moving: Option<bool>) {
-        let own = &mut self.shown;
-        own.age += 1;
-        for (velocity_mm, (now, before)) in own.velocity_mm.iter_mut().zip(std::iter::zip(centre_mm, own.centre_mm)) {
+        let shown = &mut self.shown;
+        shown.age += 1;
+        for (velocity_mm, (now, before)) in shown.velocity_mm.iter_mut().zip(std::iter::zip(centre_mm, shown.centre_mm))
+        {
             *velocity_mm += (now - before - *velocity_mm) / SMOOTH;
         }
-        own.centre_mm = centre_mm;
+        shown.centre_mm = centre_mm;
         let [x, y, normal] = contact.force_N;
-        own.load_ratio = if normal > 0.0 { x.hypot(y) / normal } else { 0.0 };
-        own.load_ratio_sigma = contact.mu_sigma.map(|[x, y]| x.hypot(y) / f64::sqrt(2.0));
-        let begins = own.moving == Some(false) && moving == Some(true) && own.age > GROWN;
+        shown.load_ratio = if normal > 0.0 { x.hypot(y) / normal } else { 0.0 };
+        shown.load_ratio_sigma = contact.mu_sigma.map(|[x, y]| x.hypot(y) / f64::sqrt(2.0));
+        let begins = shown.moving == Some(false) && moving == Some(true) && shown.age > GROWN;
         if begins {
-            (own.slip_ratio, self.largest) = (Some(self.largest), 0.0);
+            (shown.slip_ratio, self.largest) = (Some(self.largest), 0.0);
         }
         // While it moves, the ratio is that of kinetic friction.
         if moving == Some(false) {
-            self.largest = self.largest.max(own.load_ratio);
+            self.largest = self.largest.max(shown.load_ratio);
         }
-        own.moving = moving;
+        shown.moving = moving;
     }
 }
 

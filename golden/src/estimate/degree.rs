@@ -19,8 +19,8 @@
 //!
 //! | pitch, thickness in mm | r | rule 1 | e_t of degree 1, 2, 3 | degree |
 //! |---|---:|---:|---|---:|
-//! | 5 × 4, 2 | 0.17 | 1 | 16 %, 4.5 %, 3.2 % | 2 |
-//! | 8 × 8, 0.91 (`sensor-4`) | 0.018 | 1 | 87 % each: contacts within a cell show next to no shear | 1 |
+//! | 5 × 4, 2 | 0.17 | 1 | 16 %, 2.2 %, 1.2 % | 3 |
+//! | 8 × 8, 0.91 (`sensor-4`) | 0.018 | 1 | 9.4 %, 8.8 %, 8.8 % | 1 |
 
 use crate::data::frame::{Contact, Frame};
 use crate::data::generator::slip::Slip;
@@ -230,14 +230,14 @@ mod tests {
 
     /// The radius alone took degree 1 here.
     #[test]
-    fn a_pitch_of_two_thicknesses_needs_degree_two() {
+    fn a_pitch_of_two_thicknesses_needs_degree_three() {
         let sensor = Sensor { rows: 10, cols: 8, pitch_x_mm: 5.0, pitch_y_mm: 4.0, thickness_mm: 2.0 };
         let scene = Scene::of_sensor(&sensor, "thin");
         let errors = errors(&scene);
-        assert!(errors[0] > 0.1 && errors[1] < 0.05 && errors[1] < 1.5 * errors[2], "{errors:?}");
+        assert!(errors[0] > 0.1 && errors[1] > 1.5 * errors[2] && errors[2] < 0.015, "{errors:?}");
         let matrices = Matrices::of(&scene, &sensor, MAX_DEGREE).unwrap();
         assert_eq!(by_radius(matrices.spectral_radius, 0.6, MAX_DEGREE), Some(1));
-        assert_eq!(matrices.degree, 2);
+        assert_eq!(matrices.degree, 3);
     }
 
     #[test]
@@ -255,7 +255,7 @@ mod tests {
     fn sensor_4_keeps_degree_one() {
         let scene = Scene::builtin("sensor-4").unwrap();
         let errors = errors(&scene);
-        assert!((errors[0] - errors[2]).abs() < 0.005, "{errors:?}");
+        assert!((1.0..1.2).contains(&(errors[0] / errors[2])), "{errors:?}");
         assert_eq!(by_effect(&scene.sensor, scene.medium, scene.search.mu_max, scene.inversion(), 1), 1);
     }
 }

@@ -62,7 +62,7 @@ mod suspect;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::Estimate;
+pub use estimate::EvidenceEstimate;
 pub use estimator::Evidence;
 pub use follow::LastFit;
 
@@ -75,12 +75,12 @@ const EXPLAINED: f64 = 0.5;
 
 impl Evidence {
     /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.
-    pub fn solve(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
+    pub fn solve(&self, b: &[f64], noise_MPa: Option<f64>) -> EvidenceEstimate {
         self.solve_without(b, &[], noise_MPa)
     }
 
     /// The same without the readings of the taxels `missing`, row-major indices.
-    pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> Estimate {
+    pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> EvidenceEstimate {
         self.solve_after(&mut None, b, missing, noise_MPa)
     }
 
@@ -91,12 +91,12 @@ impl Evidence {
         b: &[f64],
         missing: &[usize],
         noise_MPa: Option<f64>,
-    ) -> Estimate {
+    ) -> EvidenceEstimate {
         let there: Vec<bool> = (0..b.len()).map(|t| self.alive[t] && !missing.contains(&t)).collect();
         let Some(unit) = suspect::peak(b, &there) else {
             *last = None;
             let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
-            return Estimate { forces_N, noise_MPa, ..Estimate::default() };
+            return EvidenceEstimate { forces_N, noise_MPa, ..EvidenceEstimate::default() };
         };
         // In units of the peak, so that no frame is too small or too large.
         let scaled: Vec<f64> = b.iter().map(|b| b / unit).collect();
@@ -121,7 +121,7 @@ impl Evidence {
     }
 
     /// What stress `b` in MPa says without a fit: Σ b·area.
-    pub fn without_fit(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
+    pub fn without_fit(&self, b: &[f64], noise_MPa: Option<f64>) -> EvidenceEstimate {
         failed::estimate(self, b, noise_MPa)
     }
 }

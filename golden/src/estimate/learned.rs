@@ -95,7 +95,7 @@ pub struct Learned {
     first: FirstLayer,
 }
 
-/// μ as the network knows it.
+/// μ from the network, as a normal density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian {
     /// Mean of μ, [x, y].

@@ -74,12 +74,12 @@ impl Misfit {
     }
 
     /// The misfit of the calibrated `frame` of a result, over its limit; `noise_MPa` is the stated standard deviation of a
-    /// taxel, 0 if none is. `None` where the condition of the scene is not met, so that the network was not asked.
+    /// taxel, 0 if none is. `None` where the condition of the scene is not met, so that the network was not evaluated.
     pub fn of(&self, result: &Reconstruction, frame: &Frame, noise_MPa: f64) -> Option<f64> {
         self.of_stress(&frame.stress_MPa, &self.mu_of_taxels(result)?, noise_MPa)
     }
 
-    /// The μ of each taxel, that of its contact, of the nearest one, or of the array; `None` if the network was not asked.
+    /// The μ of each taxel, that of its contact, of the nearest one, or of the array; `None` if the network was not evaluated.
     pub fn mu_of_taxels(&self, result: &Reconstruction) -> Option<Vec<[f64; 2]>> {
         let n = self.sensor.taxels();
         let whole = result.subarrays.iter().find(|own| own.centroid_condition)?;

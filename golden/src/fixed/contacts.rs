@@ -15,7 +15,7 @@ use super::words::network::WordNetwork;
 
 /// The contacts of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Contacts {
+pub struct FrameContacts {
     /// Contact of each taxel, row-major, as [`segment`](segment::Segmented::labels) numbers them.
     pub labels: Vec<usize>,
     /// The contacts, that with the largest load first.
@@ -46,7 +46,7 @@ impl Passes<'_> {
         network: &WordNetwork,
         contacts: &ContactPlan,
         codes: &[i32],
-    ) -> (Contacts, QuadStream) {
+    ) -> (FrameContacts, QuadStream) {
         let (plan, formats, layout) = (self.plan, self.formats, self.layout);
         let first = self.first();
         let words: Vec<i64> = layout.unpack(&first.taxels).iter().map(|p| segment::word(formats, *p)).collect();
@@ -61,11 +61,11 @@ impl Passes<'_> {
             let read = window(formats, &contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);
             self.streams.windows.extend(read.input.iter().chain(&read.mask));
             self.operands.window = [read.input, read.mask];
-            let told = self.ask(network);
+            let estimate = self.evaluate(network);
             let condition = read.own.meets(plan.scene.partition.condition);
-            let position = if condition { told.position } else { [0; 2] };
-            self.tell(position);
-            all.push(Contact { middle, condition, position, ln_sigma: told.ln_sigma });
+            let position = if condition { estimate.position } else { [0; 2] };
+            self.push_position(position);
+            all.push(Contact { middle, condition, position, ln_sigma: estimate.ln_sigma });
         }
         let positions: Vec<[i64; 2]> = all.iter().map(|contact| contact.position.map(i64::from)).collect();
         let values = self.relaxed(first, |passes, operands| {
@@ -75,7 +75,7 @@ impl Passes<'_> {
             passes.operands.sheared.push(sheared);
         });
         let segment_cycles = found.cycles;
-        (Contacts { labels: found.labels, all, overflow: found.overflow, segment_cycles }, values)
+        (FrameContacts { labels: found.labels, all, overflow: found.overflow, segment_cycles }, values)
     }
 }
 

@@ -16,8 +16,8 @@ use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
 use crate::data::input::means::Window;
 use crate::data::input::memory::Memory;
-use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
-use crate::estimate::float::objective::Estimate;
+use crate::data::reception::{full_scale, noise_floor_codes, receive, SubarrayStats};
+use crate::estimate::float::objective::MuEstimate;
 use crate::result::checks::Checks;
 use crate::result::errors::Errors;
 use crate::result::flags::{frame_flags, Flag, FlagSet};
@@ -45,7 +45,7 @@ struct StatusMu {
     found: bool,
     mu: [f64; 2],
     /// What the network said, where there is one.
-    estimate: Option<Estimate>,
+    estimate: Option<MuEstimate>,
 }
 
 impl Model {
@@ -220,9 +220,9 @@ impl Model {
     }
 
     /// A subarray and its status, and how much the shear may be wrong, if the status tells.
-    fn of_status(&self, part: &Subarray, received: Received, status: &Status) -> (SubarrayResult, Option<f64>) {
+    fn of_status(&self, part: &Subarray, received: SubarrayStats, status: &Status) -> (SubarrayResult, Option<f64>) {
         let StatusMu { condition, found, mu, estimate } = self.mu_of(status);
-        let received = Received { condition_met: condition, ..received };
+        let received = SubarrayStats { condition_met: condition, ..received };
         let score = match estimate {
             Some(estimate) => Some(estimate.found.objective),
             None => found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
@@ -284,13 +284,13 @@ impl Model {
         statuses.iter().enumerate().map(raised).fold(FlagSet::default(), FlagSet::bitor)
     }
 
-    /// What a status says of μ.
+    /// μ of a status.
     fn mu_of(&self, status: &Status) -> StatusMu {
         let Status { condition, found, .. } = *status;
         let unit = 1.0 / MU_STEPS as f64;
         let mu = status.position().map(|x| f64::from(x) * unit * self.scene.search.mu_max);
         let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
-        let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position()));
+        let estimate = (found && self.has_network()).then(|| MuEstimate::of_density(mu, sigma, status.position()));
         StatusMu { condition, found, mu, estimate }
     }
 
@@ -299,7 +299,7 @@ impl Model {
         let StatusMu { condition, mu, estimate, .. } = self.mu_of(status);
         let objective_value = estimate.map(|estimate| estimate.found.objective);
         let own = Region { centroid_condition: condition, mu, objective_value, ..own };
-        own.with_sigma(estimate.and_then(|told| told.sigma))
+        own.with_sigma(estimate.and_then(|estimate| estimate.sigma))
     }
 
     /// The case that a frame's status names; of a scene with one case, that case.

@@ -38,7 +38,7 @@ mod run;
 mod specimen;
 mod subarray;
 
-pub use contacts::{Contact, Contacts};
+pub use contacts::{Contact, FrameContacts};
 pub use error::{FitSuggestion, FixedError, Shortage};
 pub use model::Model;
 pub use plan::contents::{CasePlan, Dropped, OwnTables, Plan};

@@ -7,7 +7,7 @@
 //! ```
 
 use super::plan::contents::Plan;
-use super::stages::estimate::{estimate, images, Estimate};
+use super::stages::estimate::{estimate, images, MuWords};
 use super::stages::pass::{join_limbs, pass, swap, Operands};
 use super::stages::search::{search, Block, SearchResult};
 use super::stages::send::ln_sigma_word;
@@ -125,9 +125,9 @@ impl Passes<'_> {
         taxels
     }
 
-    /// What the layers of the network say; the images of each become operands. Those of whole groups of rows are passed on,
+    /// Evaluates the layers of the network; the images of each become operands. Those of whole groups of rows are passed on,
     /// zeros beyond the last.
-    pub fn ask(&mut self, network: &WordNetwork) -> Estimate {
+    pub fn evaluate(&mut self, network: &WordNetwork) -> MuWords {
         let (formats, last) = (self.formats, self.formats.layers.len() - 1);
         self.operands.layers.clear();
         for (index, rows) in formats.hidden_rows().enumerate() {
@@ -140,13 +140,13 @@ impl Passes<'_> {
             self.operands.layers.push(next);
         }
         let rows = pass(formats, self.quantised, self.layout, &layer(formats, last), &self.operands);
-        let told = estimate(network.shift, &rows);
-        self.saturations += told.saturations;
-        told
+        let found = estimate(network.shift, &rows);
+        self.saturations += found.saturations;
+        found
     }
 
-    /// Passes on a position of μ.
-    pub fn tell(&mut self, position: [i32; 2]) {
+    /// Adds a position of μ to the words that `estimate` passes on.
+    pub fn push_position(&mut self, position: [i32; 2]) {
         let [x, y] = position.map(i64::from);
         self.streams.estimated.push([x, y, 0, 0]);
     }
@@ -154,12 +154,12 @@ impl Passes<'_> {
     /// One μ for the subarray by the network.
     pub fn by_network(&mut self, network: &WordNetwork, condition: bool) -> SearchResult {
         let first = self.first();
-        let told = self.ask(network);
-        let position = if condition { told.position } else { [0; 2] };
+        let estimate = self.evaluate(network);
+        let position = if condition { estimate.position } else { [0; 2] };
         self.operands.position = position.map(i64::from);
-        self.tell(position);
+        self.push_position(position);
         let values = self.relaxed(first, |passes, operands| passes.operands.vectors.push(operands));
-        let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
+        let score = condition.then(|| i64::from(ln_sigma_word(estimate.ln_sigma)));
         SearchResult { sweeps: Vec::new(), position, score, values }
     }
 

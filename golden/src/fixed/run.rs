@@ -4,7 +4,7 @@
 //! prepare ── receive ── choose ── each subarray of the chosen case ── force ── send
 //! ```
 
-use super::contacts::Contacts;
+use super::contacts::FrameContacts;
 use super::model::Model;
 use super::plan::contact_cycles::ContactTiming;
 use super::plan::cycles::{BeatCycles, Cycles};
@@ -75,7 +75,7 @@ impl Model {
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
         let timing =
-            |contacts: &Contacts| ContactTiming { segment: contacts.segment_cycles, contacts: contacts.all.len() };
+            |contacts: &FrameContacts| ContactTiming { segment: contacts.segment_cycles, contacts: contacts.all.len() };
         let timing = solved.iter().find_map(|solved| solved.contacts.as_ref()).map(timing);
         let sending = BeatCycles::new(self, case, &searched, timing);
         let cycles = Cycles::of_beats(self, &sending);

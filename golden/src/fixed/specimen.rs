@@ -214,19 +214,19 @@ impl Model {
         if self.scene.hardware.arrays > 1 {
             return self.of_array(0)?.with_tables(scene, version);
         }
-        let mut own = self.scene.clone();
+        let mut written = self.scene.clone();
         let specimen = scene.of_array(0).with_chosen_hardware();
-        if let Some(part) = differs(&own, &specimen) {
+        if let Some(part) = differs(&written, &specimen) {
             return Err(FixedError::NoTable { part });
         }
-        own.name = specimen.name;
-        (own.input.calibration, own.input.tare) = (specimen.input.calibration, specimen.input.tare);
-        own.search.noise_floor_MPa = specimen.search.noise_floor_MPa;
-        own.threshold = specimen.threshold;
-        (own.sensor.thickness_mm, own.input.dead) = (specimen.sensor.thickness_mm, specimen.input.dead);
-        let quantised = self.quantised_for(&own)?;
-        let scale = Scale::new(&own)?;
-        let Limits { prepare, own: limits } = limits(&own, scale, self.formats().force_exponent)?;
+        written.name = specimen.name;
+        (written.input.calibration, written.input.tare) = (specimen.input.calibration, specimen.input.tare);
+        written.search.noise_floor_MPa = specimen.search.noise_floor_MPa;
+        written.threshold = specimen.threshold;
+        (written.sensor.thickness_mm, written.input.dead) = (specimen.sensor.thickness_mm, specimen.input.dead);
+        let quantised = self.quantised_for(&written)?;
+        let scale = Scale::new(&written)?;
+        let Limits { prepare, own: limits } = limits(&written, scale, self.formats().force_exponent)?;
         if prepare.reading_per_MPa != self.prepare.reading_per_MPa {
             return Err(FixedError::NoTable { part: "the largest gain, without hardware.table_range.gain," });
         }
@@ -236,7 +236,7 @@ impl Model {
             plan.first_mut().quantised = quantised;
         }
         plan.own_mut().version = version;
-        plan.scene = own;
+        plan.scene = written;
         Model::of_plan(plan)
     }
 
@@ -275,31 +275,31 @@ impl Model {
 }
 
 /// The first field of a specimen's scene that differs from the hardware's and is in no table that can be written.
-fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
+fn differs(built: &Scene, specimen: &Scene) -> Option<&'static str> {
     let mut other = specimen.clone();
-    (other.input.calibration, other.input.tare) = (own.input.calibration.clone(), own.input.tare.clone());
-    other.search.noise_floor_MPa = own.search.noise_floor_MPa;
+    (other.input.calibration, other.input.tare) = (built.input.calibration.clone(), built.input.tare.clone());
+    other.search.noise_floor_MPa = built.search.noise_floor_MPa;
     // That of the floating-point model.
-    other.search.estimator = own.search.estimator;
-    let range = &own.hardware.table_range;
+    other.search.estimator = built.search.estimator;
+    let range = &built.hardware.table_range;
     if range.thickness_mm.is_some() {
-        other.sensor.thickness_mm = own.sensor.thickness_mm;
+        other.sensor.thickness_mm = built.sensor.thickness_mm;
     }
     if range.dead_taxels > 0 {
-        other.input.dead.clone_from(&own.input.dead);
+        other.input.dead.clone_from(&built.input.dead);
     }
     if range.has_coefficients() {
         // That of the specimen that needs most.
-        other.search.degree = other.search.degree.or(own.search.degree);
+        other.search.degree = other.search.degree.or(built.search.degree);
     }
     // The hardware's scale may have been taken from its frames.
-    other.input.full_scale_MPa = other.input.full_scale_MPa.or(own.input.full_scale_MPa);
-    other.threshold = own.threshold;
-    if other.hardware.board_name() == own.hardware.board_name() {
+    other.input.full_scale_MPa = other.input.full_scale_MPa.or(built.input.full_scale_MPa);
+    other.threshold = built.threshold;
+    if other.hardware.board_name() == built.hardware.board_name() {
         // It is the same whether a scene names it or not.
-        other.hardware.board.clone_from(&own.hardware.board);
+        other.hardware.board.clone_from(&built.hardware.board);
     }
-    own.differing_field(&other)
+    built.differing_field(&other)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //!                                       └─ contacts: a μ for each ── steps of relax
 //! ```
 
-use super::contacts::{Contact, Contacts};
+use super::contacts::{Contact, FrameContacts};
 use super::passes::{Passes, Streams};
 use super::plan::contents::{CasePlan, Plan};
 use super::stages::pass::Operands;
@@ -29,7 +29,7 @@ pub struct SubarrayTrace {
     /// Result of the search, with p(μ*).
     pub found: SearchResult,
     /// The contacts, where each has a μ of its own.
-    pub contacts: Option<Contacts>,
+    pub contacts: Option<FrameContacts>,
     /// What each stage passed on.
     pub streams: Streams,
 }

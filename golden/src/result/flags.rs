@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
 /// What is known of a flag.
-struct Row {
+struct FlagRow {
     name: &'static str,
     raised_when: &'static str,
     remedy: &'static str,
@@ -86,7 +86,7 @@ macro_rules! flags {
             pub const $bit: StatusField = $field;
         )?)*
 
-        static ROWS: [Row; Flag::ALL.len()] = [$(Row {
+        static ROWS: [FlagRow; Flag::ALL.len()] = [$(FlagRow {
             name: $name,
             raised_when: $raised_when,
             remedy: $remedy,
@@ -342,7 +342,7 @@ const _: () = {
 };
 
 impl Flag {
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static FlagRow {
         &ROWS[self as usize]
     }
 

@@ -36,7 +36,7 @@ pub use pressure_template::PressureTemplate;
 pub use suspect_taxel::SuspectTaxel;
 
 use crate::data::frame::{Forces, Frame};
-use crate::data::reception::Received;
+use crate::data::reception::SubarrayStats;
 use crate::result::checks::Checks;
 use crate::result::errors::Errors;
 use crate::result::flags::Flag;
@@ -189,13 +189,13 @@ impl Reconstruction {
 
 impl SubarrayResult {
     /// The array as one subarray that is not searched, whose regions have a μ each; its own is the ratio of the resultants.
-    pub(crate) fn of_regions(part: &Subarray, received: &Received, [x, y, normal]: [f64; 3]) -> Self {
+    pub(crate) fn of_regions(part: &Subarray, received: &SubarrayStats, [x, y, normal]: [f64; 3]) -> Self {
         let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
         SubarrayResult::new(part, received, mu, None)
     }
 
     /// The result of subarray `part`.
-    pub(crate) fn new(part: &Subarray, received: &Received, mu: [f64; 2], objective_value: Option<f64>) -> Self {
+    pub(crate) fn new(part: &Subarray, received: &SubarrayStats, mu: [f64; 2], objective_value: Option<f64>) -> Self {
         SubarrayResult {
             row0: part.row0,
             col0: part.col0,

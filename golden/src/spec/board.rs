@@ -268,8 +268,9 @@ impl Board {
 
     /// Name without its folder, and text of the file that `field` names.
     fn beside(&self, field: &str, name: &str) -> Result<(String, String), BoardError> {
-        let told = |error: std::io::Error| self.invalid(field, format!("{field}: {}: {error}", self.path_of(name)));
-        let text = self.folder.read(name).map_err(told)?;
+        let unreadable =
+            |error: std::io::Error| self.invalid(field, format!("{field}: {}: {error}", self.path_of(name)));
+        let text = self.folder.read(name).map_err(unreadable)?;
         Ok((name.rsplit('/').next().unwrap_or(name).to_owned(), text))
     }
 

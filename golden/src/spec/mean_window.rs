@@ -51,9 +51,9 @@ impl MeanWindow {
     /// The weight of each mean; they add up to 1.
     pub fn weights(self, averages: &[u32]) -> Vec<f64> {
         let weight = |k: u32| match self {
-            MeanWindow::Mean(own) => f64::from(u8::from(k == own)),
-            MeanWindow::Extrapolated(own) if k == own => 2.0 - 0.5f64.powi(own as i32),
-            MeanWindow::Extrapolated(own) if k == own + 1 => 0.5f64.powi(own as i32) - 1.0,
+            MeanWindow::Mean(window) => f64::from(u8::from(k == window)),
+            MeanWindow::Extrapolated(window) if k == window => 2.0 - 0.5f64.powi(window as i32),
+            MeanWindow::Extrapolated(window) if k == window + 1 => 0.5f64.powi(window as i32) - 1.0,
             MeanWindow::Extrapolated(_) => 0.0,
         };
         averages.iter().map(|&k| weight(k)).collect()

@@ -1,7 +1,7 @@
 //! Window: the rectangle of taxels that a network reads, and where it lies on an array.
 //!
-//! An array of at most [`WHOLE_UP_TO`] taxels is one window. On a larger one, and wherever the network is asked for each of
-//! several contacts, the window has a contact in its middle; it may reach beyond the array, where its readings are 0 and its
+//! An array of at most [`WHOLE_UP_TO`] taxels is one window. On a larger one, and wherever the network is evaluated for each
+//! of several contacts, the window has a contact in its middle; it may reach beyond the array, where its readings are 0 and its
 //! mask is 1.
 //!
 //! | | shape | unit |

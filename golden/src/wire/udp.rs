@@ -328,7 +328,7 @@ impl CoreIdentity {
 
 /// What a core answers, once it is whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum CoreAnswer {
     /// To a question.
     Identity {
         /// That of the question.
@@ -367,7 +367,7 @@ pub struct Answers {
 
 impl Answers {
     /// Takes a packet; the answer that is whole with it.
-    pub fn add(&mut self, bytes: &[u8]) -> Option<Answer> {
+    pub fn add(&mut self, bytes: &[u8]) -> Option<CoreAnswer> {
         let Some(packet) = Packet::of_bytes(bytes) else {
             self.damaged += 1;
             return None;
@@ -376,9 +376,9 @@ impl Answers {
         match kind {
             Kind::Identity => {
                 let identity = CoreIdentity::of_words(&packet.words)?;
-                Some(Answer::Identity { sequence, identity })
+                Some(CoreAnswer::Identity { sequence, identity })
             }
-            Kind::TablesTaken => Some(Answer::TablesTaken { sequence, index }),
+            Kind::TablesTaken => Some(CoreAnswer::TablesTaken { sequence, index }),
             Kind::Result | Kind::ShortResult => {
                 // A result that lacks a packet is given up once it is old.
                 self.fragments.retain(|own, _| sequence.wrapping_sub(*own) <= LAYOUT.late);
@@ -391,7 +391,7 @@ impl Answers {
                     return None;
                 }
                 let words = self.fragments.remove(&sequence)?.into_values().flatten().collect();
-                Some(Answer::Result { sequence, cycles, words, clipped: flags & CLIPPED != 0 })
+                Some(CoreAnswer::Result { sequence, cycles, words, clipped: flags & CLIPPED != 0 })
             }
             Kind::Frame | Kind::Identify | Kind::Tables => None,
         }
@@ -454,7 +454,7 @@ mod tests {
             head.split(&words, 360).unwrap()
         };
         let mut answers = Answers::default();
-        let whole = |sequence| Answer::Result { sequence, cycles: 9, words: words.clone(), clipped: true };
+        let whole = |sequence| CoreAnswer::Result { sequence, cycles: 9, words: words.clone(), clipped: true };
         let [first, second] = [of(1), of(2)];
         // The flags of the last packet count.
         assert_eq!(answers.add(&first[0].to_bytes()), None);

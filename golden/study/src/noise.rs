@@ -49,5 +49,5 @@ pub use presses::{press_study, Averaged, PressEngine, PressRow, PressStudy};
 pub use sensitivity::{other_medium, sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use slip::{slip_study, SlipRow};
-pub use study::{study, Averaging, Row, Spread, Study, StudyError, AVERAGED};
+pub use study::{study, Averaging, NoiseRow, Spread, Study, StudyError, AVERAGED};
 pub use unlike::{misfit_limit, unlike_study, UnlikeRow};

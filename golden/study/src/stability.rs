@@ -15,7 +15,7 @@
 //! | | |
 //! |---|---|
 //! | in | a scene with a partition into equal rectangles, of which one is measured |
-//! | out | [`Row`]; errors are fractions, gain in N/MPa |
+//! | out | [`StabilityRow`]; errors are fractions, gain in N/MPa |
 
 pub mod extended;
 pub mod extreme;
@@ -65,7 +65,7 @@ pub struct Spectrum {
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct StabilityRow {
     /// The quantity varied, or the scene's name.
     pub group: String,
     /// The measured subarray.
@@ -96,7 +96,7 @@ pub struct Row {
 ///
 /// # Errors
 /// [`GoldenError`]: a partition that does not divide the array, or a frame that does not fit the scene.
-pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
+pub fn measure(setting: &Setting) -> Result<StabilityRow, GoldenError> {
     let Setting { group, scene, frame } = setting;
     let case = Some(scene.partition.case).filter(|case| case.grid().is_some()).unwrap_or(Case::WHOLE);
     let shape = subarrays(case, &scene.sensor)?[0].sensor(&scene.sensor);
@@ -105,7 +105,7 @@ pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
     // Input options and the threshold are reset: full scale is the frame's peak, no known force is dropped.
     (scene.input, scene.threshold.min_force_N) = (Default::default(), 0.0);
     let rule = scene.inversion();
-    let mut row = Row {
+    let mut row = StabilityRow {
         group: group.clone(),
         sensor: scene.sensor.clone(),
         medium: scene.medium,
@@ -127,7 +127,7 @@ pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
 }
 
 /// Fills the row of a scene that the golden model accepts.
-fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<(), GoldenError> {
+fn fill(row: &mut StabilityRow, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<(), GoldenError> {
     let Some(matrices) = golden.matrices() else { return Ok(()) };
     let Matrices { condition, rank, gain, spectral_radius: radius, degree, .. } = *matrices;
     row.spectrum = Some(Spectrum { condition, rank, gain, radius, degree });

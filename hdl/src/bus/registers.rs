@@ -63,7 +63,7 @@ impl Block for Registers {
 
         let is = |register: &Register| io.access.address.is(register.address as u64);
         let any = |which: &dyn Fn(&Register) -> bool| {
-            REGISTERS.iter().filter(|own| which(own)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+            REGISTERS.iter().filter(|register| which(register)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
         };
         let known = k.wire("known", any(&|_| true));
         let waiting = match self.writable {
@@ -73,15 +73,16 @@ impl Block for Registers {
                 None
             }
         };
-        let writable = any(&|own| own.access.is_written() && own.access != Access::Push);
-        let room = waiting.map_or(k.constant(1, 0), |waiting| any(&|own| own.access == Access::Push) & !*waiting);
+        let writable = any(&|register| register.access.is_written() && register.access != Access::Push);
+        let room =
+            waiting.map_or(k.constant(1, 0), |waiting| any(&|register| register.access == Access::Push) & !*waiting);
         let writable = k.wire("writable", writable | room);
         let wrong = k.wire("wrong", io.access.select & !io.access.write.mux(writable, known));
         // What a write does is in the low byte, but for an image's end and its array.
         let written = k.wire("written", io.access.select & io.access.write & io.access.strobe.at(0));
         let bits = |name: &str| {
-            let own = REGISTERS.iter().find(|own| own.name == name);
-            let reaches = own.map_or(k.constant(1, 0), |own| written & is(own));
+            let register = REGISTERS.iter().find(|register| register.name == name);
+            let reaches = register.map_or(k.constant(1, 0), |register| written & is(register));
             move |field: registers::Field| reaches & io.access.data.at(field.low)
         };
         let control = bits("control");
@@ -122,9 +123,9 @@ impl Block for Registers {
             .iter()
             .rev()
             .map(|&(field, event)| {
-                let own = k.state(&format!("error_{}", field.name), Type::unsigned(1), io.rst, 0);
-                own.set(event | (*own & !cleared(field)));
-                *own
+                let error = k.state(&format!("error_{}", field.name), Type::unsigned(1), io.rst, 0);
+                error.set(event | (*error & !cleared(field)));
+                *error
             })
             .collect();
         // As many as there are labels in the queue.
@@ -136,10 +137,10 @@ impl Block for Registers {
         let counters = counters(k, &io, [wrong, lost], clear);
         let value = |register: &Register| match register.access {
             Access::Constant => {
-                let own = self.constants.iter().find(|(name, _)| *name == register.name);
-                own.map(|(_, content)| k.constant(REGISTER_BITS, u64::from(*content)))
+                let constant = self.constants.iter().find(|(name, _)| *name == register.name);
+                constant.map(|(_, content)| k.constant(REGISTER_BITS, u64::from(*content)))
             }
-            Access::ReadOnly => counters.iter().find(|(name, _)| *name == register.name).map(|(_, own)| *own),
+            Access::ReadOnly => counters.iter().find(|(name, _)| *name == register.name).map(|(_, counter)| *counter),
             Access::ClearedByOne => Some(concat(&errors).extend(REGISTER_BITS)),
             Access::Push => waiting.map(|waiting| {
                 let below = k.constant(registers::WAITING.low, 0);
@@ -148,7 +149,7 @@ impl Block for Registers {
             Access::Pulse => None,
         };
         let arms: Vec<(u64, Expr)> =
-            REGISTERS.iter().filter_map(|own| Some((own.address as u64, value(own)?))).collect();
+            REGISTERS.iter().filter_map(|register| Some((register.address as u64, value(register)?))).collect();
         k.when(io.access.select, || {
             content.set(io.access.address.case(&arms, k.constant(REGISTER_BITS, 0)));
             refused.set(wrong);

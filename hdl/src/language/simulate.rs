@@ -89,33 +89,36 @@ impl Simulation {
         }
         let node = |id| program.operand(kernel, id).slot as usize;
         let mut transitions = Vec::new();
-        for (signal, of, register) in kernel.registers() {
-            let own = kernel.interned[&(Node::Signal(signal), of.ty)];
-            let sign = |value: u64| match of.ty.signed && of.ty.bits < 64 && value >> (of.ty.bits - 1) & 1 == 1 {
-                true => value | !mask(of.ty.bits),
+        for (signal, definition, register) in kernel.registers() {
+            let held = kernel.interned[&(Node::Signal(signal), definition.ty)];
+            let sign = |value: u64| match definition.ty.signed
+                && definition.ty.bits < 64
+                && value >> (definition.ty.bits - 1) & 1 == 1
+            {
+                true => value | !mask(definition.ty.bits),
                 false => value,
             };
-            let Some(next) = of.value else { continue };
-            slots[node(own)] = sign(register.initial.unwrap_or(0));
+            let Some(next) = definition.value else { continue };
+            slots[node(held)] = sign(register.initial.unwrap_or(0));
             let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
-            let limbs = limbs(of.ty.bits) as usize;
+            let limbs = limbs(definition.ty.bits) as usize;
             // A register with an enable takes the word or keeps its own.
             let (enable, taken) = match kernel.nodes[next].0 {
-                Node::Mux(enable, taken, kept) if kept == own => (Some(node(enable)), taken),
+                Node::Mux(enable, taken, kept) if kept == held => (Some(node(enable)), taken),
                 _ => (None, next),
             };
             let collides = match kernel.nodes[taken].0 {
                 Node::Read { memory, address } if kernel.memories[memory].unchecked => {
-                    Some(Collision { memory, address: node(address), bits: of.ty.bits, enable })
+                    Some(Collision { memory, address: node(address), bits: definition.ty.bits, enable })
                 }
                 _ => None,
             };
-            let (to, next, domain) = (node(own), node(next), register.domain);
+            let (to, next, domain) = (node(held), node(next), register.domain);
             transitions.push(Transition { to, next, limbs, reset, domain, collides });
         }
         let mut writes = Vec::new();
-        for (memory, of) in kernel.memories.iter().enumerate() {
-            writes.extend(of.writes.iter().map(|write| WritePort {
+        for (memory, definition) in kernel.memories.iter().enumerate() {
+            writes.extend(definition.writes.iter().map(|write| WritePort {
                 memory,
                 enable: node(write.enable),
                 address: node(write.address),
@@ -184,17 +187,17 @@ impl Simulation {
     /// An edge of one domain; says whether anything changed.
     fn edge(&mut self, domain: Option<usize>) -> bool {
         let Simulation { program, slots, memories, transitions, staged, writes, .. } = self;
-        let own = |transition: &&Transition| transition.domain == domain;
+        let in_domain = |transition: &&Transition| transition.domain == domain;
         run(&program.edge, &program.wide, slots, memories);
         let mut at = 0;
-        for transition in transitions.iter().filter(own) {
-            let own = &mut staged[at..][..transition.limbs];
+        for transition in transitions.iter().filter(in_domain) {
+            let target = &mut staged[at..][..transition.limbs];
             match transition.reset {
                 Some((condition, value)) if slots[condition] != 0 => {
-                    own.fill(0);
-                    own[0] = value;
+                    target.fill(0);
+                    target[0] = value;
                 }
-                _ => own.copy_from_slice(&slots[transition.next..][..transition.limbs]),
+                _ => target.copy_from_slice(&slots[transition.next..][..transition.limbs]),
             }
             let taken = |collision: &&Collision| collision.enable.is_none_or(|enable| slots[enable] != 0);
             if let Some(&Collision { memory, address, bits, .. }) = transition.collides.as_ref().filter(taken) {
@@ -202,7 +205,7 @@ impl Simulation {
                     write.memory == memory && slots[write.enable] != 0 && slots[write.address] == slots[address]
                 };
                 if writes.iter().any(written) {
-                    own.iter_mut().enumerate().for_each(|(limb, value)| *value ^= mask((bits - 64 * limb).min(64)));
+                    target.iter_mut().enumerate().for_each(|(limb, value)| *value ^= mask((bits - 64 * limb).min(64)));
                 }
             }
             at += transition.limbs;
@@ -220,11 +223,11 @@ impl Simulation {
             }
         }
         let mut at = 0;
-        for transition in transitions.iter().filter(own) {
-            let own = &mut slots[transition.to..][..transition.limbs];
+        for transition in transitions.iter().filter(in_domain) {
+            let target = &mut slots[transition.to..][..transition.limbs];
             let next = &staged[at..][..transition.limbs];
-            if own != next {
-                own.copy_from_slice(next);
+            if target != next {
+                target.copy_from_slice(next);
                 changed = true;
             }
             at += transition.limbs;

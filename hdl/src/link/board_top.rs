@@ -4,7 +4,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::wire::link::Identity;
 
-use super::{FrameGate, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
+use super::{FrameGate, Lamps, PacketLink, PacketParams, PowerOn, SpiSlave, Uart};
 use crate::block;
 use crate::engine::Engine;
 use crate::error::HdlError;
@@ -126,7 +126,7 @@ impl BoardTop {
             false => Source::Engine(Box::new(Engine::new(model))),
             true => Source::Scan(Box::new(ScanCore::new(model)?)),
         };
-        let packets = PacketLink::new(&Shape::of(model), &identity);
+        let packets = PacketLink::new(&PacketParams::of(model), &identity);
         Ok(BoardTop { link: model.scene.hardware.link, identity, packets, source })
     }
 }

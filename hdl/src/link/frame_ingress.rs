@@ -2,7 +2,7 @@
 
 use dermis_golden::wire::link::code_bytes;
 
-use super::Shape;
+use super::PacketParams;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, table_beat};
@@ -62,9 +62,9 @@ block! {
 const HELD: usize = 2;
 
 impl FrameIngress {
-    /// For the frames and images of `shape`.
-    pub fn new(shape: &Shape) -> Self {
-        FrameIngress { taxels: shape.codes(), bits: shape.input_bits as usize, image_bytes: shape.image_bytes }
+    /// For the frames and images of `params`.
+    pub fn new(params: &PacketParams) -> Self {
+        FrameIngress { taxels: params.codes(), bits: params.input_bits as usize, image_bytes: params.image_bytes }
     }
 }
 

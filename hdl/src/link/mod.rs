@@ -67,7 +67,7 @@ use dermis_golden::wire::link::{image_bytes, payloads, supports, Counters, Ident
 
 /// Properties of a scene on which its packets depend.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub struct PacketParams {
     /// Rows of the array.
     pub rows: usize,
     /// Columns of the array.
@@ -113,8 +113,8 @@ impl Answers {
     }
 }
 
-impl Shape {
-    /// The shape of the scene of `model`.
+impl PacketParams {
+    /// The packets of the scene of `model`.
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
         let input_bits = model.formats().code_bits;
@@ -128,7 +128,7 @@ impl Shape {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,
         };
-        Shape {
+        PacketParams {
             rows: sensor.rows,
             cols: sensor.cols,
             input_bits,

@@ -6,7 +6,8 @@ use super::counter_ram::CounterRamPorts;
 use super::packer::PackerPorts;
 use super::requests::RequestsPorts;
 use super::{
-    CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
+    CounterRam, Crc, FrameIngress, Packer, PacketParams, Parser, Requests, Resultants, SlipDecoder, SlipEncoder,
+    Sources,
 };
 use crate::block;
 use crate::language::{Block, Builder, Inside, Outside};
@@ -23,7 +24,7 @@ block! {
     /// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
     pub struct PacketLink {
         /// What the packets depend on.
-        shape: Shape,
+        params: PacketParams,
         /// Answer to a request for the identity.
         identity: Identity,
     }
@@ -43,7 +44,7 @@ block! {
         /// The link accepts the byte in this cycle.
         in send_ready;
         /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
-        source<Stream> s_axis: shape.stream_bits();
+        source<Stream> s_axis: params.stream_bits();
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
         sink<Stream> m_axis: BEAT_BITS;
         /// A frame is asked for and its answer not begun.
@@ -56,22 +57,22 @@ block! {
 }
 
 impl PacketLink {
-    /// For the packets of `shape`; requests for the identity are answered with `identity`.
-    pub fn new(shape: &Shape, identity: &Identity) -> Self {
-        PacketLink { shape: shape.clone(), identity: *identity }
+    /// For the packets of `params`; requests for the identity are answered with `identity`.
+    pub fn new(params: &PacketParams, identity: &Identity) -> Self {
+        PacketLink { params: params.clone(), identity: *identity }
     }
 }
 
 impl Block for PacketLink {
     fn build<'k>(&self, k: &'k Builder, io: PacketLinkPorts<Inside<'k>>) {
-        let registered = self.shape.answers.are_fast();
+        let registered = self.params.answers.are_fast();
         let decoder = k.instance("decoder", SlipDecoder::default());
-        let parser = k.instance("parser", Parser::new(&self.shape));
-        let ingress = k.instance("ingress", FrameIngress::new(&self.shape));
-        let towards = registered.then(|| RegisterSlice::new(self.shape.stream_bits()));
+        let parser = k.instance("parser", Parser::new(&self.params));
+        let ingress = k.instance("ingress", FrameIngress::new(&self.params));
+        let towards = registered.then(|| RegisterSlice::new(self.params.stream_bits()));
         let towards = k.instance("towards", towards);
-        let requests = k.instance("requests", Requests::new(&self.shape));
-        let packer = k.instance("packer", Packer::new(self.shape.payloads()));
+        let requests = k.instance("requests", Requests::new(&self.params));
+        let packer = k.instance("packer", Packer::new(self.params.payloads()));
         let encoder = k.instance("encoder", SlipEncoder::new(registered));
         let counters = k.instance("counters", CounterRam::new(&self.identity, registered));
         let arriving = k.instance("arriving", Crc::default());
@@ -152,9 +153,9 @@ impl PacketLink {
         counters: &CounterRamPorts<Outside<'k>>,
         packer: &PackerPorts<Outside<'k>>,
     ) {
-        let registered = self.shape.answers.are_fast();
+        let registered = self.params.answers.are_fast();
         let back = k.instance("back", registered.then(|| RegisterSlice::new(BEAT_BITS)));
-        let resultants = k.instance("resultants", Resultants::new(&self.shape));
+        let resultants = k.instance("resultants", Resultants::new(&self.params));
         let sources = k.instance("sources", Sources::new(registered));
 
         resultants.run.set(sources.answer_wanted);

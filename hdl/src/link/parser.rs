@@ -2,7 +2,7 @@
 
 use dermis_golden::wire::link::{code_bytes, Header, Kind, OVERHEAD};
 
-use super::Shape;
+use super::PacketParams;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::count_bits;
@@ -61,12 +61,12 @@ const UNKNOWN: u64 = 4;
 const LENGTH: u64 = 8;
 
 impl Parser {
-    /// For the frames and images of `shape`, whose payloads have at most 65535 bytes.
-    pub fn new(shape: &Shape) -> Self {
+    /// For the frames and images of `params`, whose payloads have at most 65535 bytes.
+    pub fn new(params: &PacketParams) -> Self {
         Parser {
-            frame_bytes: shape.codes() * code_bytes(shape.input_bits),
-            frame_kinds: shape.answers.requests().iter().map(|kind| *kind as u8).collect(),
-            image_bytes: shape.image_bytes,
+            frame_bytes: params.codes() * code_bytes(params.input_bits),
+            frame_kinds: params.answers.requests().iter().map(|kind| *kind as u8).collect(),
+            image_bytes: params.image_bytes,
         }
     }
 }
@@ -123,7 +123,7 @@ impl Block for Parser {
         let at = |index: usize| count.is(index as u64);
         let never = k.constant(1, 0);
         let payload = |name: &str, kinds: &[u8], bytes: usize| {
-            let is = any(never, kinds.iter().map(|&of| kind.is(of.into())));
+            let is = any(never, kinds.iter().map(|&payload_kind| kind.is(payload_kind.into())));
             let right = k.register(&format!("{name}_length"), bit);
             Payload {
                 is: k.wire(name, is),
@@ -132,18 +132,18 @@ impl Block for Parser {
             }
         };
         let of_image = self.image_bytes.map(|bytes| payload("tables", &[Kind::Tables as u8], bytes));
-        io.image.set(of_image.as_ref().map_or(never, |of| of.is));
+        io.image.set(of_image.as_ref().map_or(never, |payload_kind| payload_kind.is));
         let payloads = [payload("frame", &self.frame_kinds, self.frame_bytes), payload("plain", &PLAIN_KINDS, 0)];
         let payloads: Vec<Payload<'_>> = payloads.into_iter().chain(of_image).collect();
         let too_short = count.less(k.constant(c, OVERHEAD as u64));
         let wrong_crc = k.wire("wrong_crc", too_short | !io.crc_right);
         let all = || payloads.iter();
         // Those of which the bytes are passed on.
-        let passed = || all().filter(|of| of.bytes > 0);
-        let right_length = any(never, all().map(|of| of.is_right(*count)));
+        let passed = || all().filter(|payload_kind| payload_kind.bytes > 0);
+        let right_length = any(never, all().map(|payload_kind| payload_kind.is_right(*count)));
         let wrong_length = k.wire("wrong_length", !right_length);
         let empty = k.wire("empty", at(0) & !*lost);
-        let known = any(never, all().map(|of| of.is));
+        let known = any(never, all().map(|payload_kind| payload_kind.is));
         let cause = |cause: u64| k.constant(4, cause);
         let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
         let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
@@ -151,8 +151,8 @@ impl Block for Parser {
         good.set(io.packet_end & !empty & !*lost & !wrong_crc & !wrong_length);
         io.bad.set(fault.any());
 
-        let begins = any(never, passed().map(|of| of.is & of.ends_header(io.content)));
-        let ends = any(never, passed().map(|of| of.ends(*count)));
+        let begins = any(never, passed().map(|payload_kind| payload_kind.is & payload_kind.ends_header(io.content)));
+        let ends = any(never, passed().map(|payload_kind| payload_kind.ends(*count)));
         let frame_begin = io.frame_begin.set(io.content_valid & at(Header::BYTES - 1) & begins);
         io.payload.set(io.content_valid & *streaming);
         k.when(io.spoiled, || lost.set(k.constant(1, 1)));
@@ -162,7 +162,7 @@ impl Block for Parser {
         let takes = k.wire("takes", io.content_valid & !clears);
         k.when(takes & at(0), || kind.set(io.content));
         k.when(takes & at(1), || number.set(io.content));
-        k.when(takes & (at(2) | at(3)), || all().for_each(|of| of.take(io.content, count.at(0))));
+        k.when(takes & (at(2) | at(3)), || all().for_each(|payload_kind| payload_kind.take(io.content, count.at(0))));
     }
 }
 

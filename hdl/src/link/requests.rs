@@ -2,7 +2,7 @@
 
 use dermis_golden::wire::link::Kind;
 
-use super::{Shape, COUNTERS, FORCES, IDENTITY, RESULTANTS};
+use super::{PacketParams, COUNTERS, FORCES, IDENTITY, RESULTANTS};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::count_bits;
@@ -58,9 +58,9 @@ block! {
 }
 
 impl Requests {
-    /// For the requests of `shape`.
-    pub fn new(shape: &Shape) -> Self {
-        Requests { depth: shape.frames, images: shape.image_bytes.is_some(), scanned: shape.scanned() }
+    /// For the requests of `params`.
+    pub fn new(params: &PacketParams) -> Self {
+        Requests { depth: params.frames, images: params.image_bytes.is_some(), scanned: params.scanned() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! From the engine's beats to the words of an answer: all beats, or sums and status.
 
-use super::{Answers, Shape};
+use super::{Answers, PacketParams};
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
 use crate::{block, states};
@@ -50,9 +50,9 @@ states! {
 const LAST_WORD: u64 = 3;
 
 impl Resultants {
-    /// For the array of `shape`.
-    pub fn new(shape: &Shape) -> Self {
-        Resultants { sides: (shape.answers == Answers::Both).then_some([shape.rows, shape.cols]) }
+    /// For the array of `params`.
+    pub fn new(params: &PacketParams) -> Self {
+        Resultants { sides: (params.answers == Answers::Both).then_some([params.rows, params.cols]) }
     }
 }
 
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn the_sums_are_those_of_the_model() {
         for (rows, cols) in [(3, 5), (6, 2)] {
-            let shape = Shape {
+            let params = PacketParams {
                 rows,
                 cols,
                 input_bits: 12,
@@ -306,7 +306,7 @@ mod tests {
                 scans: false,
             };
             let mut answers = Expected { rows, cols, ..Expected::default() };
-            check(&kernel_of(&Resultants::new(&shape)), &stimulus(12_000, rows, cols), &mut answers);
+            check(&kernel_of(&Resultants::new(&params)), &stimulus(12_000, rows, cols), &mut answers);
         }
     }
 }

@@ -88,13 +88,13 @@ mod tests {
         sent: usize,
         /// With registers: the byte is known, and whether it was taken in the cycle before.
         stands: bool,
-        told: bool,
+        was_taken: bool,
         reset: bool,
     }
 
     impl Parts {
         fn new(registered: bool) -> Self {
-            Parts { registered, sent: 0, stands: false, told: false, reset: false }
+            Parts { registered, sent: 0, stands: false, was_taken: false, reset: false }
         }
 
         /// The bytes of the link; whether one is offered; whether its last is accepted in this cycle.
@@ -115,7 +115,7 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let (parts, stands, taken) = self.state(inputs);
             let data = parts.get(self.sent).filter(|_| stands).map(|&byte| Word::from(u64::from(byte)));
-            let content_ready = Word::from(if self.registered { self.told } else { taken });
+            let content_ready = Word::from(if self.registered { self.was_taken } else { taken });
             let defined = |word| self.reset.then_some(word);
             vec![
                 defined(content_ready),
@@ -128,7 +128,7 @@ mod tests {
             let (_, stands, taken) = self.state(inputs);
             let goes = stands && inputs[4].number() == 1;
             self.sent = if taken { 0 } else { self.sent + usize::from(goes) };
-            (self.stands, self.told) = (inputs[3].number() == 1 && !taken && !self.told, taken);
+            (self.stands, self.was_taken) = (inputs[3].number() == 1 && !taken && !self.was_taken, taken);
             if inputs[0].number() == 1 {
                 *self = Parts { reset: true, ..Parts::new(self.registered) };
             }
@@ -151,7 +151,7 @@ mod tests {
             let mut inputs = vec![Word::from(rst)];
             inputs.extend(&offered);
             inputs.push(Word::from(random.bool()));
-            let accepted = if registered { parts.told } else { parts.state(&inputs).2 };
+            let accepted = if registered { parts.was_taken } else { parts.state(&inputs).2 };
             if accepted {
                 offered[2] = Word::default();
             }

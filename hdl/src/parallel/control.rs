@@ -71,15 +71,15 @@ fn unless<'k>(value: Expr<'k>, condition: Option<Expr<'k>>) -> Expr<'k> {
 }
 
 impl<'k> Parallel<'k, '_> {
-    /// `word` of the last cycle in which `keep` was high; `word` itself where it never varies.
-    pub(super) fn held(&self, name: &str, keep: Expr<'k>, word: Expr<'k>, varies: bool) -> Expr<'k> {
+    /// `word` of the last cycle in which `enable` was high; `word` itself where it never varies.
+    pub(super) fn held(&self, name: &str, enable: Expr<'k>, word: Expr<'k>, varies: bool) -> Expr<'k> {
         if !varies {
             return word;
         }
         let register = self.k.instance(name, EnableRegister::new(word.bits()));
-        register.keep.set(keep);
+        register.enable.set(enable);
         register.word.set(word);
-        register.kept
+        register.held
     }
 
     /// A bit that takes `value` where `takes` is high.
@@ -131,7 +131,7 @@ impl<'k> Parallel<'k, '_> {
         let idle = ready & !begins.q & !computing.q;
         begins.d.set(if self.is_ahead() { idle } else { idle & !sending.q });
         let begin_frame = k.wire("begin_frame", begins.q);
-        let frame_case = self.held("frame_case", begin_frame, s.receive.which, parts.len() > 1);
+        let frame_case = self.held("frame_case", begin_frame, s.receive.case_index, parts.len() > 1);
         let start = k.wire("start", begin_frame | again.q);
         let (positive, negative) = (s.receive.positive, s.receive.negative);
         let meets = match self.model.scene.partition.condition {
@@ -159,7 +159,7 @@ impl<'k> Parallel<'k, '_> {
 
         k.comment("Then the next subarray starts");
         let part = k.instance("part", CaseCounter::new(&parts));
-        part.which.set(frame_case);
+        part.case_index.set(frame_case);
         part.clear.set(restart);
         part.enable.set(hand_over);
         again.d.set(hand_over & !part.last);

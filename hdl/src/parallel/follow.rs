@@ -12,17 +12,17 @@ impl<'k> Parallel<'k, '_> {
         let (k, s, model) = (self.k, &self.s, self.model);
         let chooses = model.chooses();
         k.comment("Case of the frame in the passes, searched, sent");
-        s.fold.which.set(c.frame_case);
-        s.rescale.which.set(c.frame_case);
-        s.unfold.which.set(c.frame_case);
+        s.fold.case_index.set(c.frame_case);
+        s.rescale.case_index.set(c.frame_case);
+        s.unfold.case_index.set(c.frame_case);
         let searched_case = self.held("searched_case", c.hand_over, c.frame_case, chooses);
         let sent_case = self.held("sent_case", c.begin_send, searched_case, chooses);
         if let Some(search) = &s.search {
-            search.fill_which.set(c.frame_case);
-            search.which.set(searched_case);
+            search.fill_case.set(c.frame_case);
+            search.case_index.set(searched_case);
         }
-        s.forces.which.set(sent_case);
-        s.send.which.set(sent_case);
+        s.forces.case_index.set(sent_case);
+        s.send.case_index.set(sent_case);
 
         k.comment("Whether `tlast` was early or missing");
         let framing = self.bit("framing", c.arrives, s.receive.framing);

@@ -52,7 +52,7 @@ impl<'k> Parallel<'k, '_> {
         s.fold.read_address.set(s.pass.input_address);
         s.pass.input_quad.set(s.fold.read_quad);
         let contacts = s.contacts.as_ref();
-        s.pass.which.set(contacts.map_or(c.frame_case, |contacts| contacts.section));
+        s.pass.section.set(contacts.map_or(c.frame_case, |contacts| contacts.section));
         s.pass.start.set(contacts.map_or(s.fold.readable, |contacts| contacts.pass_start));
         s.rescale.start.set(c.start);
         s.rescale.quad.set(s.pass.quad);

@@ -3,7 +3,7 @@
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::stages::scan::{alignment, rail};
 
-use super::Shape;
+use super::ScanParams;
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
 use crate::primitives::Stream;
@@ -17,13 +17,13 @@ block! {
     /// all converters leave one after the other, beginning three cycles after `done`; the frames before the next
     /// channel's last must leave them time for it: `clear`.
     pub struct ScanCapture {
-        shape: Shape,
+        params: ScanParams,
     }
     ports ScanCapturePorts {
         clock;
         reset;
         /// Outputs of the converters, one bit each; pins, asynchronous to the clock.
-        in miso: shape.scan.converters;
+        in miso: params.scan.converters;
         /// The pins were to be sampled one cycle ago.
         in take;
         /// A frame ended one cycle ago.
@@ -37,11 +37,11 @@ block! {
         /// It is in the last channel of the last row.
         in ends;
         /// Its channel, unsigned; valid with `done`.
-        in channel: count_bits(shape.scan.channels);
+        in channel: count_bits(params.scan.channels);
         /// For each converter whether its taxel is not dead; valid with `done`.
-        in alive: shape.scan.converters;
+        in alive: params.scan.converters;
         /// A taxel's code, two's complement; valid with `m_axis_tvalid`.
-        source<Stream> m_axis: shape.code_bits as usize;
+        source<Stream> m_axis: params.code_bits as usize;
         /// The last code of a scan is accepted in this cycle.
         out complete;
         /// A sample of the scan was at an end of the range; valid with `complete`.
@@ -54,15 +54,15 @@ block! {
 }
 
 impl ScanCapture {
-    /// For the scan of this shape.
-    pub fn new(shape: &Shape) -> Self {
-        ScanCapture { shape: shape.clone() }
+    /// For the scan of `params`.
+    pub fn new(params: &ScanParams) -> Self {
+        ScanCapture { params: params.clone() }
     }
 }
 
 impl Block for ScanCapture {
     fn build<'k>(&self, k: &'k Builder, io: ScanCapturePorts<Inside<'k>>) {
-        let Shape { scan, code_bits, .. } = &self.shape;
+        let ScanParams { scan, code_bits, .. } = &self.params;
         let (converter, count, power) = (&scan.converter, scan.converters, scan.average as usize);
         let (bits, tag_bits, code) = (converter.bits as usize, converter.tag_bits as usize, *code_bits as usize);
         // One bit more than a result, for the sign of a unipolar one.
@@ -79,7 +79,7 @@ impl Block for ScanCapture {
 
         let waiting = k.state("waiting", Type::unsigned(count_bits(count + 1)), io.rst, 0).comment("Codes that wait.");
         let is_last = k.register("is_last", bit);
-        let held: Vec<_> = (0..count).map(|own| k.register(&format!("held_{own}"), Type::unsigned(code))).collect();
+        let held: Vec<_> = (0..count).map(|pin| k.register(&format!("held_{pin}"), Type::unsigned(code))).collect();
         let offered = io.m_axis.valid.set(waiting.any());
         let moves = k.wire("moves", offered & io.m_axis.ready);
         k.when(moves, || {
@@ -87,10 +87,10 @@ impl Block for ScanCapture {
             held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
         });
         let (mut at_end, mut at_other) = (Vec::new(), Vec::new());
-        for (own, to) in held.iter().enumerate() {
-            let name = |of: &str| format!("{of}_{own}");
+        for (pin, to) in held.iter().enumerate() {
+            let name = |of: &str| format!("{of}_{pin}");
             let answer = k.register(&name("answer"), Type::unsigned(bits + tag_bits));
-            k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(own))));
+            k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(pin))));
             let raw = answer.low(bits);
             let value = match converter.bipolar {
                 // Less the middle of the range.
@@ -120,10 +120,10 @@ impl Block for ScanCapture {
             let mean = sum.shift_left(shift).round_shift(power).low(code);
             let [top, bottom] =
                 [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
-            let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
-            k.when(*closing, || to.set(own_code));
-            at_end.push((high | low) & io.alive.at(own));
-            at_other.push(wrong & io.alive.at(own));
+            let code_out = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
+            k.when(*closing, || to.set(code_out));
+            at_end.push((high | low) & io.alive.at(pin));
+            at_other.push(wrong & io.alive.at(pin));
         }
         k.when(*closing, || {
             waiting.set(k.constant(waiting.bits(), count as u64));
@@ -143,7 +143,7 @@ impl Block for ScanCapture {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sequencer::tests::shape;
+    use super::super::sequencer::tests::params;
     use super::*;
     use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
@@ -154,7 +154,7 @@ mod tests {
 
     /// Codes of whole channels by the stage.
     struct Codes {
-        shape: Shape,
+        params: ScanParams,
         /// Answers of each converter so far: all bits, then samples of the channel.
         bits: Vec<u32>,
         answers: Vec<Vec<u32>>,
@@ -171,10 +171,10 @@ mod tests {
     }
 
     impl Codes {
-        fn new(shape: &Shape) -> Self {
-            let count = shape.scan.converters;
+        fn new(params: &ScanParams) -> Self {
+            let count = params.scan.converters;
             Codes {
-                shape: shape.clone(),
+                params: params.clone(),
                 bits: vec![0; count],
                 answers: vec![Vec::new(); count],
                 pins: [0, 0].into(),
@@ -198,7 +198,7 @@ mod tests {
             let complete = next.is_some_and(|next| next.1) && inputs[10].number() == 1;
             let flag = |flag: Flag| complete.then(|| Word::from(self.flags.contains(flag)));
             vec![
-                next.map(|next| Word::of_fields(&[next.0.into()], self.shape.code_bits as usize)),
+                next.map(|next| Word::of_fields(&[next.0.into()], self.params.code_bits as usize)),
                 bit(next.is_some()),
                 next.map(|next| Word::from(next.1)),
                 bit(complete),
@@ -210,7 +210,7 @@ mod tests {
 
         fn clock(&mut self, inputs: &[Word]) {
             let of = |k: usize| inputs[k].number();
-            let scan = self.shape.scan;
+            let scan = self.params.scan;
             if !self.waiting.is_empty() && of(10) == 1 && self.waiting.pop_front().is_some_and(|(_, last)| last) {
                 self.flags = FlagSet::default();
             }
@@ -232,7 +232,7 @@ mod tests {
                     let codes = self
                         .answers
                         .iter()
-                        .map(|answers| code(&scan, self.shape.code_bits, channel as usize, answers.iter().copied()));
+                        .map(|answers| code(&scan, self.params.code_bits, channel as usize, answers.iter().copied()));
                     let codes: Vec<(i32, FlagSet)> = codes.collect();
                     let live = codes.iter().enumerate().filter(|(own, _)| alive >> own & 1 == 1);
                     let flags = live.fold(FlagSet::default(), |flags, (_, (_, own))| flags | *own);
@@ -250,14 +250,14 @@ mod tests {
             self.ended = (of(3) == 1 && of(4) == 1).then(|| [of(5), of(6), of(7), of(8), of(9)]);
             if of(0) == 1 {
                 *self =
-                    Codes { reset: true, pins: self.pins.clone(), bits: self.bits.clone(), ..Codes::new(&self.shape) };
+                    Codes { reset: true, pins: self.pins.clone(), bits: self.bits.clone(), ..Codes::new(&self.params) };
             }
         }
     }
 
     /// Frames of random answers, every fourth at an end of the range, every eighth of another channel; a receiver that stalls.
-    fn stimulus(shape: &Shape, channels: usize) -> Vec<Vec<Word>> {
-        let (scan, mut random) = (&shape.scan, fastrand::Rng::with_seed(7));
+    fn stimulus(params: &ScanParams, channels: usize) -> Vec<Vec<Word>> {
+        let (scan, mut random) = (&params.scan, fastrand::Rng::with_seed(7));
         let converter = &scan.converter;
         let mut all = Vec::new();
         let mut push = |miso: u64, take: bool, done: bool, of: [u64; 6], ready: bool, rst: bool| {
@@ -313,10 +313,10 @@ mod tests {
 
     #[test]
     fn codes_and_marks_are_those_of_the_stage() {
-        for shape in [shape(0, 3, 2, &[]), shape(0, 1, 0, &[]), shape(1, 2, 3, &[]), shape(1, 8, 0, &[])] {
+        for params in [params(0, 3, 2, &[]), params(0, 1, 0, &[]), params(1, 2, 3, &[]), params(1, 8, 0, &[])] {
             let subject = |changes: &[Change]| {
                 subject_of!(
-                    ScanCapture::new(&shape),
+                    ScanCapture::new(&params),
                     changes,
                     inputs [rst, miso, take, done, result, opens, closes, ends, channel, alive, m_axis_tready],
                     outputs [m_axis_tdata, m_axis_tvalid, m_axis_tlast, complete, rail, other, clear],
@@ -327,10 +327,10 @@ mod tests {
                 Change::value("", "high_0", |k| k.named("closing")),
                 Change::value("", "taken", |k| k.named("take") & !k.named("miso").at(0)),
             ];
-            if shape.scan.converter.tag_bits > 0 {
+            if params.scan.converter.tag_bits > 0 {
                 defects.push(Change::value("", "wrong_0", |k| k.constant(1, 0)));
             }
-            check_with_defects(subject, &stimulus(&shape, 40), || Codes::new(&shape), &defects);
+            check_with_defects(subject, &stimulus(&params, 40), || Codes::new(&params), &defects);
         }
     }
 }

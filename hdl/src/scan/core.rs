@@ -4,7 +4,7 @@
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
 
-use super::{ScanCapture, ScanCodes, ScanSequencer, ScanStatus, ScanTables, Shape};
+use super::{ScanCapture, ScanCodes, ScanParams, ScanSequencer, ScanStatus, ScanTables};
 use crate::block;
 use crate::engine::Engine;
 use crate::error::HdlError;
@@ -15,7 +15,7 @@ use crate::streams::BEAT_BITS;
 block! {
     /// An engine that reads the converters of its array by itself.
     pub struct ScanCore {
-        shape: Shape,
+        params: ScanParams,
         engine: Engine,
         /// Beats of forces in a frame.
         forces: usize,
@@ -30,7 +30,7 @@ block! {
         /// A byte of an image of tables, as a beat of the engine's stream; valid with `s_axis_tvalid`.
         sink<Stream> s_axis: tables.as_ref().map_or(0, |_| engine.widths().s_axis.data);
         /// Address of the row that is driven, unsigned; valid after the reset.
-        out row: count_bits(shape.rows);
+        out row: count_bits(params.rows);
         /// Serial clock of all converters.
         out adc_sclk;
         /// Chip select of all converters, active low.
@@ -38,7 +38,7 @@ block! {
         /// Commands to all converters.
         out adc_mosi;
         /// Outputs of the converters, one bit each; valid while `adc_cs_n` is low.
-        in adc_miso: shape.scan.converters;
+        in adc_miso: params.scan.converters;
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
         source<Stream> m_axis: BEAT_BITS;
     }
@@ -56,14 +56,14 @@ impl ScanCore {
     /// # Errors
     /// [`HdlError::Unsupported`] where codes come as a stream.
     pub fn new(model: &Model) -> Result<Self, HdlError> {
-        let shape = Shape::of(model)?;
-        let code_bits = shape.code_bits as usize;
+        let params = ScanParams::of(model)?;
+        let code_bits = params.code_bits as usize;
         let tables = || Tables {
             tables: ScanTables::new(code_bits),
             codes: ScanCodes::new(model.scene.sensor.taxels(), code_bits),
         };
         let tables = model.has_writable_tables().then(tables);
-        Ok(ScanCore { shape, engine: Engine::new(model), forces: model.force_beats(), tables })
+        Ok(ScanCore { params, engine: Engine::new(model), forces: model.force_beats(), tables })
     }
 }
 
@@ -72,20 +72,20 @@ impl Block for ScanCore {
         let tables = self.tables.as_ref().map(|tables| k.instance("tables", &tables.tables));
         let codes = self.tables.as_ref().map(|tables| k.instance("codes", &tables.codes));
         let restart = k.instance("restart", Dff {});
-        let sequencer = k.instance("sequencer", ScanSequencer::new(&self.shape));
-        let capture = k.instance("capture", ScanCapture::new(&self.shape));
+        let sequencer = k.instance("sequencer", ScanSequencer::new(&self.params));
+        let capture = k.instance("capture", ScanCapture::new(&self.params));
         let engine = k.instance("engine", &self.engine);
-        let told = k.instance("told", ScanStatus::new(self.forces));
+        let scan_status = k.instance("scan_status", ScanStatus::new(self.forces));
         k.comment("Registered, because the engine is large and its reset has a long route.");
         restart.d.set(io.rst);
-        let restarts = [&sequencer.rst, &capture.rst, &engine.rst, &told.rst];
+        let restarts = [&sequencer.rst, &capture.rst, &engine.rst, &scan_status.rst];
         let of_tables: Vec<&Net> =
             tables.iter().map(|tables| &tables.rst).chain(codes.iter().map(|codes| &codes.rst)).collect();
         restarts.into_iter().chain(of_tables).for_each(|rst| rst.set(restart.q));
 
         k.comment("Scan");
         sequencer.clear.set(capture.clear);
-        let room = told.room & io.enable;
+        let room = scan_status.room & io.enable;
         sequencer.room.set(codes.as_ref().map_or(room, |codes| room & codes.room));
         io.row.set(sequencer.row);
         io.adc_sclk.set(sequencer.sclk);
@@ -115,10 +115,10 @@ impl Block for ScanCore {
         }
 
         k.comment("Forces, and marks in the status");
-        told.complete.set(tables.as_ref().map_or(capture.complete, |tables| tables.complete));
-        told.rail.set(capture.rail);
-        told.other.set(capture.other);
-        engine.m_axis.connect(&told.s_axis);
+        scan_status.complete.set(tables.as_ref().map_or(capture.complete, |tables| tables.complete));
+        scan_status.rail.set(capture.rail);
+        scan_status.other.set(capture.other);
+        engine.m_axis.connect(&scan_status.s_axis);
         match tables.as_ref().zip(codes.as_ref()) {
             Some((tables, codes)) => {
                 k.unused([capture.complete]);
@@ -126,10 +126,10 @@ impl Block for ScanCore {
                 codes.passed.set(tables.passed);
                 codes.complete.set(tables.complete);
                 codes.broken.set(tables.broken);
-                told.m_axis.connect(&codes.s_axis);
+                scan_status.m_axis.connect(&codes.s_axis);
                 codes.m_axis.connect(&io.m_axis);
             }
-            None => told.m_axis.connect(&io.m_axis),
+            None => scan_status.m_axis.connect(&io.m_axis),
         }
     }
 }

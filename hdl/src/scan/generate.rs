@@ -4,7 +4,7 @@ use dermis_golden::fixed::Model;
 use serde_json::json;
 
 use super::core::scanner;
-use super::Shape;
+use super::ScanParams;
 use crate::error::HdlError;
 use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::Change;
@@ -42,7 +42,7 @@ pub fn generate_scan(model: &Model) -> Result<Generated, HdlError> {
 /// # Errors
 /// As [`generate_scan`]; a change that does not apply to the hardware.
 pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
-    let Shape { scan, timing, .. } = Shape::of(model)?;
+    let ScanParams { scan, timing, .. } = ScanParams::of(model)?;
     let hierarchy = scanner(model)?.changed(changes)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_scan", top_name(&model.scene.name));

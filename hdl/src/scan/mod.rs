@@ -39,7 +39,7 @@ use crate::error::HdlError;
 
 /// What decides the circuits of a scan.
 #[derive(Clone, Debug)]
-pub struct Shape {
+pub struct ScanParams {
     /// Converters and averages.
     pub scan: AdcScan,
     /// Cycles.
@@ -63,18 +63,18 @@ pub(crate) fn require_stream(model: &Model, what: &'static str) -> Result<(), Hd
     }
 }
 
-impl Shape {
-    /// The shape of the scan of `model`.
+impl ScanParams {
+    /// The scan of `model`.
     ///
     /// # Errors
     /// [`HdlError::Unsupported`] where codes come as a stream.
-    pub fn of(model: &Model) -> Result<Shape, HdlError> {
+    pub fn of(model: &Model) -> Result<ScanParams, HdlError> {
         let hardware = &model.scene.hardware;
         let (Some(scan), Some(timing)) = (hardware.adc_scan, model.scan_timing()) else {
             let value = "stream".to_owned();
             return Err(HdlError::Unsupported { field: "hardware.source", value, what: "a scan" });
         };
         let (rows, code_bits) = (model.scene.sensor.rows, model.formats().code_bits);
-        Ok(Shape { scan, timing, rows, code_bits, dead: model.dead.clone() })
+        Ok(ScanParams { scan, timing, rows, code_bits, dead: model.dead.clone() })
     }
 }

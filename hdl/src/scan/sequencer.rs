@@ -3,7 +3,7 @@
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::spec::adc::timing::Timing;
 
-use super::Shape;
+use super::ScanParams;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Type};
 
@@ -17,7 +17,7 @@ block! {
     /// `take` and `done` are one cycle after the edge of the pin: the input registers of `scan_capture` have the sample
     /// then. What belongs to `done` is held until the next.
     pub struct ScanSequencer {
-        shape: Shape,
+        params: ScanParams,
     }
     ports ScanSequencerPorts {
         clock;
@@ -28,7 +28,7 @@ block! {
         /// There is room for the flags of one more scan.
         in room;
         /// Address of the row that is driven, unsigned; pins of the array.
-        out row: count_bits(shape.rows);
+        out row: count_bits(params.rows);
         /// Serial clock; pin of all converters.
         out sclk;
         /// Chip select, active low; pin of all converters.
@@ -48,22 +48,22 @@ block! {
         /// It is in the last channel of the last row.
         out ends;
         /// Its channel, unsigned; valid with `done`.
-        out channel: count_bits(shape.scan.channels);
+        out channel: count_bits(params.scan.channels);
         /// For each converter whether its taxel is not dead; valid with `done`.
-        out alive: shape.scan.converters;
+        out alive: params.scan.converters;
     }
 }
 
 impl ScanSequencer {
-    /// For the scan of this shape.
-    pub fn new(shape: &Shape) -> Self {
-        ScanSequencer { shape: shape.clone() }
+    /// For the scan of `params`.
+    pub fn new(params: &ScanParams) -> Self {
+        ScanSequencer { params: params.clone() }
     }
 }
 
 /// For each converter whether its taxel in this row and channel is not dead.
-fn alive<'k>(k: &'k Builder, shape: &Shape, row: Expr<'k>, channel: Expr<'k>) -> Expr<'k> {
-    let Shape { scan, rows, dead, .. } = shape;
+fn alive<'k>(k: &'k Builder, params: &ScanParams, row: Expr<'k>, channel: Expr<'k>) -> Expr<'k> {
+    let ScanParams { scan, rows, dead, .. } = params;
     let count = scan.converters;
     let mask = |place: usize| {
         let (at, own) = (place >> channel.bits(), place & ((1 << channel.bits()) - 1));
@@ -81,7 +81,7 @@ fn alive<'k>(k: &'k Builder, shape: &Shape, row: Expr<'k>, channel: Expr<'k>) ->
 
 impl Block for ScanSequencer {
     fn build<'k>(&self, k: &'k Builder, io: ScanSequencerPorts<Inside<'k>>) {
-        let Shape { scan, timing, rows, dead, .. } = &self.shape;
+        let ScanParams { scan, timing, rows, dead, .. } = &self.params;
         let Timing { half, gap, channel_gap, row_gap, period, .. } = *timing;
         let converter = &scan.converter;
         let steps = 2 * u64::from(converter.frame_bits);
@@ -168,7 +168,7 @@ impl Block for ScanSequencer {
             ends.set(last_channel & last_row);
             channel.set(*asked);
         });
-        let mask = alive(k, &self.shape, *row, *asked);
+        let mask = alive(k, &self.params, *row, *asked);
         if dead.is_empty() {
             io.alive.set(mask);
         } else {
@@ -187,7 +187,7 @@ pub(super) mod tests {
     use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
 
     /// A small scan at 100 MHz.
-    pub fn shape(converter: usize, converters: usize, average: u32, dead: &[usize]) -> Shape {
+    pub fn params(converter: usize, converters: usize, average: u32, dead: &[usize]) -> ScanParams {
         let scan = AdcScan {
             converter: CONVERTERS[converter],
             converters,
@@ -199,26 +199,26 @@ pub(super) mod tests {
             period_us: if average > 1 { 250.0 } else { 60.0 },
         };
         let timing = Timing::new(&scan, 2, 100.0).unwrap();
-        Shape { scan, timing, rows: 2, code_bits: 17, dead: dead.to_vec() }
+        ScanParams { scan, timing, rows: 2, code_bits: 17, dead: dead.to_vec() }
     }
 
     /// What belongs to the end of a frame: `result` to `alive`.
-    type Told = [u64; 6];
+    type ConversionEnd = [u64; 6];
     /// Row, CS low, SCLK away from idle, MOSI where it is defined; for the end of a frame what belongs to it.
-    type Pins = (u64, bool, bool, Option<u64>, Option<Told>);
+    type Pins = (u64, bool, bool, Option<u64>, Option<ConversionEnd>);
 
     /// The pins of a scan, cycle by cycle, written down as the documentation of [`Timing`] says.
     struct Schedule {
-        shape: Shape,
+        params: ScanParams,
         pins: Vec<Pins>,
         at: Option<usize>,
-        told: Vec<Option<Told>>,
+        ended: Vec<Option<ConversionEnd>>,
         took: bool,
     }
 
     impl Schedule {
-        fn new(shape: &Shape) -> Self {
-            let Shape { scan, timing, rows, .. } = shape;
+        fn new(params: &ScanParams) -> Self {
+            let ScanParams { scan, timing, rows, .. } = params;
             let converter = &scan.converter;
             let mut pins = vec![(0, false, false, None, None)];
             for row in 0..*rows as u64 {
@@ -244,7 +244,7 @@ pub(super) mod tests {
                     let closes = sample + 1 == scan.samples();
                     let ends = row + 1 == *rows as u64 && channel + 1 == scan.channels;
                     let first = (row as usize * scan.channels + channel) * scan.converters;
-                    let alive = (0..scan.converters).filter(|k| !shape.dead.contains(&(first + k)));
+                    let alive = (0..scan.converters).filter(|k| !params.dead.contains(&(first + k)));
                     let alive = alive.fold(0, |mask, k| mask | 1 << k);
                     let of = [frame > 0, sample == 0, closes, ends].map(u64::from);
                     pins.last_mut().unwrap().4 = Some([of[0], of[1], of[2], of[3], channel as u64, alive]);
@@ -252,7 +252,7 @@ pub(super) mod tests {
             }
             assert_eq!(pins.len() as u64, 1 + timing.scan);
             pins.resize(timing.period as usize, (0, false, false, None, None));
-            Schedule { shape: shape.clone(), pins, at: None, told: vec![None; 2], took: false }
+            Schedule { params: params.clone(), pins, at: None, ended: vec![None; 2], took: false }
         }
     }
 
@@ -261,9 +261,9 @@ pub(super) mod tests {
             let Some(at) = self.at else { return vec![None; 12] };
             let (row, low, clocked, mosi, _) = self.pins[at % self.pins.len()];
             let bit = |bit: bool| Some(Word::from(bit));
-            let done = self.told[0];
+            let done = self.ended[0];
             let of = |k: usize| done.filter(|of| k == 0 || of[0] == 1).map(|of| Word::from(of[k]));
-            let idle = self.shape.scan.converter.idle_high;
+            let idle = self.params.scan.converter.idle_high;
             vec![
                 Some(Word::from(row)),
                 bit(clocked ^ idle),
@@ -288,10 +288,10 @@ pub(super) mod tests {
             let here = self.pins[at % self.pins.len()];
             let next = self.pins[(at + 1) % self.pins.len()];
             self.took = here.2 && !next.2;
-            self.told[0] = here.4;
+            self.ended[0] = here.4;
             self.at = Some(if inputs[0].number() == 1 { 0 } else { at + 1 });
             if inputs[0].number() == 1 {
-                (self.took, self.told[0]) = (false, None);
+                (self.took, self.ended[0]) = (false, None);
             }
         }
     }
@@ -303,15 +303,15 @@ pub(super) mod tests {
 
     #[test]
     fn pins_are_those_of_the_schedule() {
-        for shape in [shape(0, 2, 1, &[]), shape(1, 1, 0, &[4]), shape(0, 3, 0, &[1, 17])] {
-            check(subject(&shape, &[]), &stimulus(14_000), &mut Schedule::new(&shape));
+        for params in [params(0, 2, 1, &[]), params(1, 1, 0, &[4]), params(0, 3, 0, &[1, 17])] {
+            check(subject(&params, &[]), &stimulus(14_000), &mut Schedule::new(&params));
         }
     }
 
     #[test]
     fn seeded_defects_are_found() {
-        let shape = shape(0, 2, 1, &[]);
-        let changed = |changes: &[Change]| subject(&shape, changes);
+        let params = params(0, 2, 1, &[]);
+        let changed = |changes: &[Change]| subject(&params, changes);
         let defects = [
             // A row that stays.
             Change::value("", "row", |k| k.named("row")),
@@ -320,12 +320,12 @@ pub(super) mod tests {
             // One edge of SCLK less.
             Change::value("", "last_step", |k| k.named("step").is(30)),
         ];
-        check_with_defects(changed, &stimulus(9_000), || Schedule::new(&shape), &defects);
+        check_with_defects(changed, &stimulus(9_000), || Schedule::new(&params), &defects);
     }
 
-    fn subject<'a>(shape: &Shape, changes: &[Change]) -> Subject<'a> {
+    fn subject<'a>(params: &ScanParams, changes: &[Change]) -> Subject<'a> {
         subject_of!(
-            ScanSequencer::new(shape),
+            ScanSequencer::new(params),
             changes,
             inputs [rst, clear, room],
             outputs [row, sclk, cs_n, mosi, take, done, result, opens, closes, ends, channel, alive],
@@ -334,8 +334,8 @@ pub(super) mod tests {
 
     #[test]
     fn an_engine_that_is_not_ready_holds_the_scan() {
-        let shape = shape(0, 1, 0, &[]);
-        let mut subject = subject(&shape, &[]);
+        let params = params(0, 1, 0, &[]);
+        let mut subject = subject(&params, &[]);
         let low = |subject: &mut Subject, clear: bool, room: bool, rst: bool| {
             let outputs = subject.cycle(&[rst, clear, room].map(Word::from));
             outputs[2].number() == 0

@@ -123,7 +123,7 @@ impl Block for Pass {
             io.address,
         );
         let low_word = (low_bits > 0).then(|| {
-            let own = io.address.low(count_bits(self.low.len()));
+            let low_address = io.address.low(count_bits(self.low.len()));
             (
                 k.delay("low_selected", io.low),
                 coefficient_memory(
@@ -132,7 +132,7 @@ impl Block for Pass {
                     ["low_memory", "low_word", LOW_FILE],
                     &self.low,
                     low_bits,
-                    own,
+                    low_address,
                 ),
             )
         });
@@ -161,15 +161,15 @@ impl Block for Pass {
             let accumulator = k.state(&named("accumulator"), Type::unsigned(acc), clears, 0);
             // A lane holds its own parity, and in the upper half the opposite one.
             let opposite = io.write_lane.at(0) ^ io.write_lane.at(1);
-            let own = if lane == 0 || lane == 3 { !opposite } else { opposite };
+            let holds = if lane == 0 || lane == 3 { !opposite } else { opposite };
             let half = if lane % 2 == 1 { !io.write_lane.at(0) } else { io.write_lane.at(0) };
-            operands.write(io.write & own, half.concat(io.write_address), io.write_data);
+            operands.write(io.write & holds, half.concat(io.write_address), io.write_data);
             operand.set(operands.read(io.flip.concat(io.operand_address)));
             let wide = wide_word.slice(lane * OPERAND, OPERAND);
-            let own = low_word.map_or(wide, |(selected, word)| {
+            let coefficient_word = low_word.map_or(wide, |(selected, word)| {
                 selected.mux(word.slice(lane * low_bits, low_bits).extend(OPERAND), wide)
             });
-            coefficient.set(own.signed());
+            coefficient.set(coefficient_word.signed());
             factor.set(operand.signed());
             product.set(*coefficient * *factor);
             // The sums fit an accumulator, so the higher bits of a product are not needed.

@@ -44,16 +44,16 @@ impl Receive {
         io.dropped.set(first.dropped);
         io.framing.set(first.framing);
         for (number, bank) in banks.iter().enumerate() {
-            k.unused([bank.full, bank.which]);
+            k.unused([bank.full, bank.case_index]);
             if number > 0 {
                 k.unused([bank.s_axis.ready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
             }
         }
         io.full.set(choose.settled);
-        io.which.set(choose.which);
+        io.case_index.set(choose.case_index);
         let chosen = |of: fn(&ReceivePorts<Outside<'k>>) -> Expr<'k>| {
             let each: Vec<Expr> = banks.iter().map(of).collect();
-            expression_by_case(choose.which, &each).unwrap_or(each[0])
+            expression_by_case(choose.case_index, &each).unwrap_or(each[0])
         };
         io.quad.set(chosen(|bank| bank.quad));
         io.magnitude.set(chosen(|bank| bank.magnitude));
@@ -82,13 +82,13 @@ mod tests {
 
     impl Reference for Banks<'_> {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let [which, settled] = <[_; 2]>::try_from(self.choice.outputs(&[])).unwrap();
+            let [case_index, settled] = <[_; 2]>::try_from(self.choice.outputs(&[])).unwrap();
             let settles = settled.is_some_and(|settled| settled.number() == 1);
-            let index = which.map_or(0, |which| which.number() as usize);
+            let index = case_index.map_or(0, |case_index| case_index.number() as usize);
             let mut outputs = self.buffers[index].outputs(inputs);
-            (outputs[5], outputs[6]) = (settled, which);
+            (outputs[5], outputs[6]) = (settled, case_index);
             // Before the first choice no buffer is chosen; what is gathered of a subarray is that of the chosen case.
-            outputs[7] = outputs[7].filter(|_| which.is_some());
+            outputs[7] = outputs[7].filter(|_| case_index.is_some());
             outputs[8..11].iter_mut().for_each(|gathered| *gathered = gathered.filter(|_| settles));
             outputs
         }
@@ -130,7 +130,7 @@ mod tests {
                 changes,
                 inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
                 outputs [
-                    s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive,
+                    s_axis_tready, accept, taken_word, row_end, dropped, full, case_index, quad, magnitude, positive,
                     negative, framing
                 ],
             )

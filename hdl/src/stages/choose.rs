@@ -13,7 +13,7 @@ use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
 
 block! {
-    /// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
+    /// Monitors the accepted codes. `case_index` is valid with `settled`, from four cycles after the frame's last code until
     /// `free`, and keeps its value until the next choice.
     pub struct Choose {
         sensor: Sensor,
@@ -37,7 +37,7 @@ block! {
         /// The frame has been read: clears `settled`.
         in free;
         /// Index of the chosen case; valid with `settled`.
-        out which: count_bits(grids.len());
+        out case_index: count_bits(grids.len());
         /// The choice for the frame in the buffer is complete.
         out settled;
     }
@@ -117,8 +117,8 @@ impl Block for Choose {
                 let refused = signs.map_or(cut, |signs| cut | differ(signs, *grid));
                 (!refused).mux(k.constant(which_bits, case as u64), other)
             });
-        let which = io.which.register();
-        k.when(*last3, || which.set(choice));
+        let case_index = io.case_index.register();
+        k.when(*last3, || case_index.set(choice));
         let settled = io.settled.register();
         settled.set((*settled | *last3) & !free & !rst);
     }
@@ -179,13 +179,13 @@ pub(crate) mod tests {
         seen: FrameStats,
         /// Edges until the choice, while a frame is complete.
         left: Option<usize>,
-        which: Option<u64>,
+        case_index: Option<u64>,
         settled: Option<bool>,
     }
 
     impl<'a> Expected<'a> {
         pub(crate) fn new(rule: &'a Choose) -> Self {
-            Expected { rule, index: 0, seen: FrameStats::default(), left: None, which: None, settled: None }
+            Expected { rule, index: 0, seen: FrameStats::default(), left: None, case_index: None, settled: None }
         }
 
         /// A frame is complete and has not been read.
@@ -196,19 +196,19 @@ pub(crate) mod tests {
 
     impl Reference for Expected<'_> {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
-            vec![self.which.map(Word::from), self.settled.map(Word::from)]
+            vec![self.case_index.map(Word::from), self.settled.map(Word::from)]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             let [rst, accept, tlast, free] = [0, 1, 2, 3].map(|k| inputs[k].number() == 1);
             let rule = self.rule;
             if rst {
-                *self = Expected { which: self.which, settled: Some(false), ..Expected::new(rule) };
+                *self = Expected { case_index: self.case_index, settled: Some(false), ..Expected::new(rule) };
                 return;
             }
             let chosen = self.left == Some(1);
             if chosen {
-                self.which = Some(self.seen.choose(&rule.grids, rule.condition, rule.floor) as u64);
+                self.case_index = Some(self.seen.choose(&rule.grids, rule.condition, rule.floor) as u64);
                 self.seen = FrameStats::default();
             }
             self.settled = self.settled.map(|settled| (settled || chosen) && !free);
@@ -263,7 +263,8 @@ pub(crate) mod tests {
             (Condition::BothSigns, 0, vec![grid(1, 1), grid(2, 1)]),
         ] {
             let rule = Choose { sensor: sensor.clone(), grids, condition, floor, bits: BITS };
-            let subject = subject_of!(rule, &[], inputs [rst, accept, tlast, free, code], outputs [which, settled]);
+            let subject =
+                subject_of!(rule, &[], inputs [rst, accept, tlast, free, code], outputs [case_index, settled]);
             check(subject, &stimulus(&rule, 30_000), &mut Expected::new(&rule));
         }
     }

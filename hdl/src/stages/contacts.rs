@@ -240,13 +240,13 @@ impl Block for Contacts {
         io.label_address.set(label_address);
         io.pass_start.set(io.readable | k.named("window_start") | k.named("shear_start"));
 
-        self.keep(k, &io, (known, *contact), enabled, (is(State::Status), status_of));
+        self.store_contacts(k, &io, (known, *contact), enabled, (is(State::Status), status_of));
     }
 }
 
 impl Contacts {
-    /// Keeps what is known of each contact, of `contact` once it is `known`, and sends it as status while `is_status`.
-    fn keep<'k>(
+    /// Stores condition, μ and σ of each contact, of `contact` once it is `known`, and sends it as status while `is_status`.
+    fn store_contacts<'k>(
         &self,
         k: &'k Builder,
         io: &ContactsPorts<Inside<'k>>,
@@ -261,13 +261,13 @@ impl Contacts {
             .map(|name| k.register(name, Type::unsigned(self.contacts * position_bits())));
         let position = [io.position_x, io.position_y];
         for axis in [0, 1] {
-            let kept = |at: usize| positions[axis].slice(index(at), position_bits());
-            let own_now = |at: usize| (known & contact.is(at as u64)).mux(position[axis], kept(at));
-            let all: Vec<Expr<'_>> = (0..self.contacts).rev().map(own_now).collect();
+            let stored = |at: usize| positions[axis].slice(index(at), position_bits());
+            let new_position = |at: usize| (known & contact.is(at as u64)).mux(position[axis], stored(at));
+            let all: Vec<Expr<'_>> = (0..self.contacts).rev().map(new_position).collect();
             positions[axis].set(concat(&all));
         }
-        let own_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !io.start;
-        conditions.set(concat(&(0..self.contacts).rev().map(own_condition).collect::<Vec<_>>()));
+        let new_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !io.start;
+        conditions.set(concat(&(0..self.contacts).rev().map(new_condition).collect::<Vec<_>>()));
         let ln_sigma = k.memory("ln_sigma_of", self.contacts, self.score_bits, Contents::Undefined);
         ln_sigma.write(known, contact, io.ln_sigma);
 
@@ -292,7 +292,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Contacts =
+    const BLOCK: Contacts =
         Contacts { quads: 5, steps: 3, contacts: 6, score_bits: 32, both_signs: true, frame_quads: 5, frame_steps: 5 };
 
     /// What is waited for.
@@ -344,7 +344,7 @@ mod tests {
         /// The positions on an axis, once those of all contacts are known.
         fn positions(&self, axis: usize) -> Option<Word> {
             let all: Vec<i64> = self.all.iter().map(|own| own.1[axis].signed(0, position_bits())).collect();
-            (all.len() == SHAPE.contacts).then(|| Word::of_fields(&all, position_bits()))
+            (all.len() == BLOCK.contacts).then(|| Word::of_fields(&all, position_bits()))
         }
 
         /// The first step begins.
@@ -410,7 +410,7 @@ mod tests {
                 _ => None,
             };
             self.quads += usize::from(taxels);
-            let complete = taxels && self.quads == SHAPE.quads;
+            let complete = taxels && self.quads == BLOCK.quads;
             if complete {
                 self.quads = 0;
             }
@@ -434,13 +434,13 @@ mod tests {
                     }
                 }
                 Some(Waits::Step(step)) if complete => {
-                    let last = step + 1 == SHAPE.steps;
+                    let last = step + 1 == BLOCK.steps;
                     next = Some(if last { Waits::Values } else { Waits::Step(step + 1) });
                     self.pulses[2] = !last;
                 }
                 Some(Waits::Values) if begins => next = Some(Waits::Status(0)),
                 Some(Waits::Status(label)) => {
-                    self.pulses[3] = label == SHAPE.contacts;
+                    self.pulses[3] = label == BLOCK.contacts;
                     next = Some(if self.pulses[3] { Waits::Start } else { Waits::Status(label + 1) });
                 }
                 _ => {}
@@ -462,7 +462,7 @@ mod tests {
         let mut model = Sequence::new();
         let mut all: Vec<Vec<Word>> = Vec::new();
         for frame in 0..60 {
-            let count = frame % (SHAPE.contacts + 1);
+            let count = frame % (BLOCK.contacts + 1);
             let mut left = if frame % 9 == 8 { random.usize(..60) } else { usize::MAX };
             let mut put = |random: &mut fastrand::Rng, model: &mut Sequence, [rst, start, answers]: [bool; 3]| {
                 let waits = model.waits;
@@ -479,10 +479,10 @@ mod tests {
                     random.bool().into(),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
-                    random_word(random, SHAPE.score_bits),
+                    random_word(random, BLOCK.score_bits),
                     answer(waits == Some(Waits::Values)),
                 ];
-                inputs.extend((0..5).map(|_| Word::from(random.u64(..SHAPE.quads as u64))));
+                inputs.extend((0..5).map(|_| Word::from(random.u64(..BLOCK.quads as u64))));
                 inputs.push(random.bool().into());
                 model.clock(&inputs);
                 all.push(inputs);
@@ -503,6 +503,6 @@ mod tests {
 
     #[test]
     fn stages_start_one_after_the_other_and_every_contact_has_its_status() {
-        check(&kernel_of(&SHAPE), &stimulus(), &mut Sequence::new());
+        check(&kernel_of(&BLOCK), &stimulus(), &mut Sequence::new());
     }
 }

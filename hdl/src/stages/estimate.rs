@@ -136,22 +136,23 @@ impl Block for Estimate {
         };
         let outputs = [POSITION_BITS, POSITION_BITS, OUTPUT_BITS, OUTPUT_BITS];
         let outputs: Vec<(Expr, Expr)> = (0..4).map(|place| output(place, outputs[place])).collect();
-        let ln_told = [later("ln_first", first), later("ln_second", second)];
+        let ln_written = [later("ln_first", first), later("ln_second", second)];
         let ln_sigma: Vec<Expr> = [2, 3]
             .map(|place| {
                 let (_, row) = OUTPUTS[place];
                 let register = k.register(&format!("ln_{place}"), Type::signed(OUTPUT_BITS as usize));
                 // It is needed with μ, much later.
                 let value = k.delay(&format!("saturated_{place}"), outputs[place].0);
-                k.when(ln_told[row], || register.set(clamped(k, value, ln_sigma_range())));
+                k.when(ln_written[row], || register.set(clamped(k, value, ln_sigma_range())));
                 register.get().extend(LN_SIGMA_BITS as usize).unsigned()
             })
             .into();
         io.ln_sigma.set(ln_sigma[1].concat(ln_sigma[0]));
         let known = self.position(k, [first, second], later, [outputs[0].0, outputs[1].0], [rst | start, enabled]);
-        let told = ["position_y", "position_x"].map(|name| k.named(name).signed().extend(self.data_bits).unsigned());
-        let told = k.constant(2 * self.data_bits, 0).concat(concat(&told));
-        io.operands.set(known.mux(told, images_out));
+        let position =
+            ["position_y", "position_x"].map(|name| k.named(name).signed().extend(self.data_bits).unsigned());
+        let position = k.constant(2 * self.data_bits, 0).concat(concat(&position));
+        io.operands.set(known.mux(position, images_out));
         io.operands_valid.set(images_valid | known);
 
         let image_clips = k.delay(
@@ -232,12 +233,12 @@ mod tests {
             Rows { model, hidden, cycle: 0, rows: Vec::new(), enabled: false, operands, saturations: 0, known }
         }
 
-        fn told(&self) -> [Word; 3] {
+        fn mu(&self) -> [Word; 3] {
             let shift = self.model.quantised().network.as_ref().unwrap().shift;
-            let told = estimate(shift, &self.rows[self.hidden..]);
+            let found = estimate(shift, &self.rows[self.hidden..]);
             let position =
-                told.position.map(|x| Word::of_fields(&[if self.enabled { x.into() } else { 0 }], position_bits()));
-            [position[0], position[1], Word::of_fields(&[ln_sigma_word(told.ln_sigma).into()], 32)]
+                found.position.map(|x| Word::of_fields(&[if self.enabled { x.into() } else { 0 }], position_bits()));
+            [position[0], position[1], Word::of_fields(&[ln_sigma_word(found.ln_sigma).into()], 32)]
         }
     }
 
@@ -247,9 +248,9 @@ mod tests {
             let known = self.known.filter(|(cycle, _)| *cycle <= self.cycle);
             let now = self.known.is_some_and(|(cycle, _)| cycle == self.cycle);
             let bits = self.model.formats().data_bits as usize;
-            let of = |n: usize| known.map(|(_, told)| told[n]);
-            let positions = known.filter(|_| now).map(|(_, told)| {
-                let [x, y] = [0, 1].map(|axis| told[axis].signed(0, position_bits()));
+            let of = |n: usize| known.map(|(_, mu)| mu[n]);
+            let positions = known.filter(|_| now).map(|(_, mu)| {
+                let [x, y] = [0, 1].map(|axis| mu[axis].signed(0, position_bits()));
                 Word::of_fields(&[x, y, 0, 0], bits)
             });
             vec![
@@ -279,7 +280,7 @@ mod tests {
                     });
                 } else if self.rows.len() == self.hidden + 2 {
                     self.saturations += estimate(network.shift, &self.rows[self.hidden..]).saturations;
-                    self.known = Some((self.cycle + LATENCY[1], self.told()));
+                    self.known = Some((self.cycle + LATENCY[1], self.mu()));
                 }
             }
             if start || rst {

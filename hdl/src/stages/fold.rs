@@ -28,7 +28,7 @@ block! {
         clock;
         reset;
         /// Index of the case; constant while a frame is computed.
-        in which: count_bits(quads.len());
+        in case_index: count_bits(quads.len());
         /// A new frame: reading restarts at the frame's first quad.
         in begin_frame;
         /// Fold the next subarray.
@@ -86,8 +86,8 @@ impl Block for Fold {
         let folded = Ram::new(depth, 1, 4 * (self.bits + 2)).holding([Holds::Folded]).registered();
         let memory = k.instance("memory", folded);
 
-        quads.which.set(io.which);
-        lead.which.set(io.which);
+        quads.case_index.set(io.case_index);
+        lead.case_index.set(io.case_index);
         lead.value.set(quads.value);
         quads.clear.set(io.start);
         quads.enable.set(running.q);
@@ -175,9 +175,9 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, which, begin_frame, start, last_part, _, read] =
+            let [rst, case_index, begin_frame, start, last_part, _, read] =
                 [0, 1, 2, 3, 4, 5, 6].map(|input| inputs[input].number() as usize);
-            let (formats, count) = (self.model.formats(), self.model.cases()[which].formats.quads);
+            let (formats, count) = (self.model.formats(), self.model.cases()[case_index].formats.quads);
             let now = self.earlier(0);
             self.memory.clock(Some(read), self.earlier(5).zip(self.folded));
             let codes = [0, 1, 2, 3].map(|lane| inputs[5].signed(lane, formats.input_bits as usize));
@@ -200,14 +200,15 @@ mod tests {
         let model = model(8, 8, "[partition]\ncases = [0, 1]\n");
         let formats = model.formats();
         let mut random = fastrand::Rng::with_seed(6);
-        let mut which = 0;
+        let mut case_index = 0;
         let cycle = |cycle: usize| {
             let rst = cycle == 0 || random.u8(..250) == 0;
             if rst {
-                which = random.u64(..2);
+                case_index = random.u64(..2);
             }
             let begin_frame = cycle == 1 || random.u8(..60) == 0;
-            let bits = [rst.into(), which, begin_frame.into(), (random.u8(..25) == 0).into(), random.bool().into()];
+            let bits =
+                [rst.into(), case_index, begin_frame.into(), (random.u8(..25) == 0).into(), random.bool().into()];
             let normalised = random_word(&mut random, 4 * formats.input_bits as usize);
             bits.map(Word::from).into_iter().chain([normalised, random.u64(..formats.quads as u64).into()]).collect()
         };
@@ -216,7 +217,7 @@ mod tests {
             subject_of!(
                 Fold::new(&model),
                 changes,
-                inputs [rst, which, begin_frame, start, last_part, normalised, read_address],
+                inputs [rst, case_index, begin_frame, start, last_part, normalised, read_address],
                 outputs [quad_address, free, normalised_valid, folded, folded_valid, readable, read_quad],
             )
         };

@@ -24,7 +24,7 @@ block! {
         clock;
         reset;
         /// Index of the case of the frame being sent; constant until its last beat.
-        in which: unit.widths().which;
+        in case_index: unit.widths().case_index;
         /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         in values: store.widths().write_data;
         /// `values` holds a step.
@@ -124,7 +124,7 @@ impl Block for Forces {
         asked.d.set(io.address);
         store.read_address.set(asked.q);
 
-        unit.which.set(io.which);
+        unit.case_index.set(io.case_index);
         unit.begin_frame.set(io.begin_frame);
         unit.part.set(io.part);
         unit.beat_part.set(io.beat_part);
@@ -296,7 +296,7 @@ mod tests {
                 Forces::new(&model),
                 changes,
                 inputs [
-                    rst, which, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
+                    rst, case_index, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
                     normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels,
                     overflow, threshold, version, incomplete, faults, values_valid, address, m_axis_tready,
                 ],

@@ -142,7 +142,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: LabelBeats = LabelBeats { layout: Quads { rows: 5, cols: 7 }, contacts: 8, beats: 2 };
+    const BLOCK: LabelBeats = LabelBeats { layout: Quads { rows: 5, cols: 7 }, contacts: 8, beats: 2 };
     const BITS: usize = 4;
     /// Cycles from the beat before to one of labels, at full speed.
     const CYCLES: usize = LABELS_PER_BEAT + READ - 1;
@@ -176,9 +176,9 @@ mod tests {
             let (beat, from) = self.next?;
             let place = (self.cycle + CYCLES).checked_sub(from + 2)?;
             let taxel = LABELS_PER_BEAT * beat + place;
-            let (rows, cols) = (SHAPE.layout.rows, SHAPE.layout.cols);
+            let (rows, cols) = (BLOCK.layout.rows, BLOCK.layout.cols);
             let inside = place < LABELS_PER_BEAT && taxel < rows * cols;
-            inside.then(|| SHAPE.layout.locate(taxel / cols, taxel % cols).address)
+            inside.then(|| BLOCK.layout.locate(taxel / cols, taxel % cols).address)
         }
     }
 
@@ -242,7 +242,7 @@ mod tests {
             let last = beats + 1 == taxels + 6;
             let mut quad = [0i64; 4];
             for (taxel, label) in labels.iter().enumerate() {
-                let place = SHAPE.layout.locate(taxel / SHAPE.layout.cols, taxel % SHAPE.layout.cols);
+                let place = BLOCK.layout.locate(taxel / BLOCK.layout.cols, taxel % BLOCK.layout.cols);
                 if place.address == sent.asked[1] {
                     (0..4).filter(|lane| place.mask >> lane & 1 == 1).for_each(|lane| quad[lane] = *label as i64);
                 }
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn labels_follow_the_forces() {
         let mut random = fastrand::Rng::with_seed(4);
-        let labels: Vec<usize> = (0..35).map(|_| random.usize(..=SHAPE.contacts)).collect();
-        check(&kernel_of(&SHAPE), &stimulus(&labels), &mut Sent::new(&labels));
+        let labels: Vec<usize> = (0..35).map(|_| random.usize(..=BLOCK.contacts)).collect();
+        check(&kernel_of(&BLOCK), &stimulus(&labels), &mut Sent::new(&labels));
     }
 }

@@ -42,9 +42,9 @@ block! {
     ports PassPorts {
         clock;
         reset;
-        /// Index of the case, constant while a frame is computed; of contacts that of the
-        /// [section](dermis_golden::fixed::words::schedule::sections), constant from `start` until its last row.
-        in which: count_bits(*sections);
+        /// Index of the [section](dermis_golden::fixed::words::schedule::sections), without contacts that of the case; constant
+        /// from `start` until its last row.
+        in section: count_bits(*sections);
         /// The products of a subarray may begin while its input is still being written; of contacts those of a section.
         in start;
         /// Address of the quad to read from the input memory; in every cycle of a product with the input.
@@ -125,8 +125,8 @@ impl Block for Pass {
         let select = k.instance("select", &self.select);
         let lanes = k.instance("lanes", &self.lanes);
 
-        pass_program.which.set(io.which);
-        lanes.which.set(io.which);
+        pass_program.section.set(io.section);
+        lanes.section.set(io.section);
         let issue = k.wire("issue", running.q & pass_program.ready);
         let column_end = k.wire("column_end", issue & pass_program.last);
         running.d.set((io.start | (running.q & !(column_end & pass_program.ends))) & !io.rst);
@@ -138,7 +138,7 @@ impl Block for Pass {
         io.input_address.set(pass_program.operand_address.low(io.input_address.bits()));
         match vectors.zip(operand_writer) {
             Some((vectors, operand_writer)) => {
-                operand_writer.which.set(io.which);
+                operand_writer.section.set(io.section);
                 operand_writer.clear.set(io.start);
                 operand_writer.valid.set(io.vector_valid);
                 pass_program.finished.set(operand_writer.finished);
@@ -392,7 +392,7 @@ mod tests {
         fn clock(&mut self, inputs: &[Word]) {
             let formats = self.model.formats();
             let quad = |input: usize, bits: u32| [0, 1, 2, 3].map(|parity| inputs[input].signed(parity, bits as usize));
-            let [rst, which, start, valid] = [0, 1, 2, 5].map(|input| inputs[input].number() as usize);
+            let [rst, section, start, valid] = [0, 1, 2, 5].map(|input| inputs[input].number() as usize);
             if let Some(address) = self.input_address(2) {
                 self.input[address] = quad(3, formats.fold_bits);
             }
@@ -419,7 +419,7 @@ mod tests {
             self.position = [6, 7].map(|input| inputs[input].signed(0, position_bits()));
             self.cycle += 1;
             if start == 1 {
-                (self.program, self.next, self.quads) = (which, Some((0, self.cycle)), Vec::new());
+                (self.program, self.next, self.quads) = (section, Some((0, self.cycle)), Vec::new());
             }
             if rst == 1 {
                 (self.next, self.rows, self.issued) = (None, Some(BTreeMap::new()), VecDeque::new());
@@ -435,8 +435,8 @@ mod tests {
         let mut all: Vec<Vec<Word>> = Vec::new();
         let mut cut = true;
         for _ in 0..subarrays {
-            let which = random.usize(..passes.programs.len());
-            let quads = passes.programs[which].0.formats.quads;
+            let section = random.usize(..passes.programs.len());
+            let quads = passes.programs[section].0.formats.quads;
             let input: Vec<Word> =
                 (0..quads).map(|_| random_word(&mut random, 4 * formats.fold_bits as usize)).collect();
             let end = if random.u8(..5) == 0 { random.usize(..200) } else { usize::MAX };
@@ -444,7 +444,7 @@ mod tests {
             let (mut at, mut pause, mut sent) = (0, random.usize(1..100), 0);
             let position = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
             // The ends of the vectors, and one more vector that is no operand.
-            let mut ends = passes.programs[which].1.operands.clone();
+            let mut ends = passes.programs[section].1.operands.clone();
             ends.push(quads);
             let ends: Vec<usize> = ends
                 .iter()
@@ -466,7 +466,7 @@ mod tests {
                 let [write, word, pair, data] = [Word::default(); 4];
                 let inputs = vec![
                     (at == 0 && cut).into(),
-                    Word::from(which as u64),
+                    Word::from(section as u64),
                     (at == 12).into(),
                     read.unwrap_or_else(|| random_word(&mut random, 4 * formats.fold_bits as usize)),
                     random_word(&mut random, 4 * formats.operand_bits() as usize),
@@ -507,7 +507,7 @@ mod tests {
                     Pass::new(&model),
                     changes,
                     inputs [
-                        rst, which, start, input_quad, vector_quad, vector_valid, position_x, position_y,
+                        rst, section, start, input_quad, vector_quad, vector_valid, position_x, position_y,
                         coefficient_write, coefficient_word, coefficient_pair, coefficient_data,
                     ],
                     outputs [input_address, quad, quad_valid, quad_soon, layer_valid, damaged, issued, step],

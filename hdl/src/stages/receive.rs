@@ -44,12 +44,12 @@ block! {
         out row_end;
         /// The beat accepted ends its frame early: the frame is dropped.
         out dropped;
-        /// The frame buffer holds a whole frame, and `which` is its case; high until `free`.
+        /// The frame buffer holds a whole frame, and `case_index` is its case; high until `free`.
         out full;
         /// The frame has been read: the buffer may be overwritten.
         in free;
         /// Index of the chosen case; valid with `full`, 0 where there is one case.
-        out which: count_bits(*cases);
+        out case_index: count_bits(*cases);
         /// Address of the quad to read, over all subarrays; sampled in every cycle.
         in quad_address: count_bits(*quads);
         /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
@@ -156,8 +156,8 @@ impl Receive {
         io.row_end.set(scan.row_end);
         io.dropped.set(early);
 
-        io.which.set(k.constant(1, 0));
-        scan.which.set(k.constant(1, 0));
+        io.case_index.set(k.constant(1, 0));
+        scan.case_index.set(k.constant(1, 0));
         scan.enable.set(taken);
         scan.clear.set(io.rst | early);
         let word = input_mask.map_or(io.s_axis.data, |mask| {
@@ -367,7 +367,7 @@ pub(crate) mod tests {
                     changes,
                     inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
                     outputs [
-                        s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive,
+                        s_axis_tready, accept, taken_word, row_end, dropped, full, case_index, quad, magnitude, positive,
                         negative, framing
                     ],
                 )

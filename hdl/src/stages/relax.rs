@@ -117,7 +117,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Relax = Relax { word: 22, data: 18, quads: 5, contacts: true };
+    const BLOCK: Relax = Relax { word: 22, data: 18, quads: 5, contacts: true };
 
     /// A sum, and how many of its words were saturated.
     type Sum = ([i64; 4], u32);
@@ -137,14 +137,14 @@ mod tests {
     }
 
     fn short(word: i64) -> i64 {
-        saturate((word + 8) >> 4, SHAPE.data as u32).0
+        saturate((word + 8) >> 4, BLOCK.data as u32).0
     }
 
     impl Reference for Sums {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let before = |cycles: usize| Some(self.sums.as_ref()?.get(cycles - 1).copied().flatten());
             let (sum, own) = (before(3), before(4));
-            let operands = own.flatten().map(|(sum, _)| Word::of_fields(&sum.map(short), SHAPE.data));
+            let operands = own.flatten().map(|(sum, _)| Word::of_fields(&sum.map(short), BLOCK.data));
             let others = [4, 5, 6].map(|input| inputs[input].number()).iter().sum();
             self.quiet = if others == self.others { self.quiet } else { 0 };
             self.others = others;
@@ -152,7 +152,7 @@ mod tests {
             vec![
                 sum.map(|sum| sum.is_some().into()),
                 own.map(|own| own.is_some().into()),
-                sum.flatten().map(|(sum, _)| Word::of_fields(&sum, SHAPE.word)),
+                sum.flatten().map(|(sum, _)| Word::of_fields(&sum, BLOCK.word)),
                 operands,
                 (self.sums.is_some() && self.quiet > 8).then(|| total.min(0xffff).into()),
             ]
@@ -163,17 +163,17 @@ mod tests {
             self.quiet += 1;
             let mut entered = None;
             if valid {
-                let words = [0, 1, 2, 3].map(|parity| inputs[2].signed(parity, SHAPE.word));
+                let words = [0, 1, 2, 3].map(|parity| inputs[2].signed(parity, BLOCK.word));
                 let mut clipped = 0;
-                let sum = match self.seen < SHAPE.quads {
+                let sum = match self.seen < BLOCK.quads {
                     true => {
                         self.first.push(words);
                         words
                     }
                     false => {
-                        let first = self.first[self.seen % SHAPE.quads];
+                        let first = self.first[self.seen % BLOCK.quads];
                         [0, 1, 2, 3].map(|parity| {
-                            let (sum, clips) = saturate(words[parity] + first[parity], SHAPE.word as u32);
+                            let (sum, clips) = saturate(words[parity] + first[parity], BLOCK.word as u32);
                             clipped += u32::from(clips);
                             sum
                         })
@@ -203,12 +203,12 @@ mod tests {
             let counts =
                 [(); 3].map(|()| Word::from(if frame % 9 == 8 { random.u64(..0xffff) } else { random.u64(..9) }));
             let mut put = |random: &mut fastrand::Rng, rst: bool, start: bool, valid: bool| {
-                let word = random_word(random, 4 * SHAPE.word);
+                let word = random_word(random, 4 * BLOCK.word);
                 stimulus.push(vec![rst.into(), start.into(), word, valid.into(), counts[0], counts[1], counts[2]]);
             };
             put(&mut random, frame % 4 == 0, false, false);
             put(&mut random, false, true, false);
-            for _ in 0..SHAPE.quads * random.usize(1..5) {
+            for _ in 0..BLOCK.quads * random.usize(1..5) {
                 put(&mut random, false, false, true);
                 (0..random.usize(..3)).for_each(|_| put(&mut random, false, false, false));
             }
@@ -219,6 +219,6 @@ mod tests {
 
     #[test]
     fn the_products_of_each_step_are_added_to_v_00() {
-        check(&kernel_of(&SHAPE), &stimulus(), &mut Sums::default());
+        check(&kernel_of(&BLOCK), &stimulus(), &mut Sums::default());
     }
 }

@@ -29,7 +29,7 @@ block! {
         clock;
         reset;
         /// Index of the case; constant while a frame is computed.
-        in which: count_bits(quads.len());
+        in case_index: count_bits(quads.len());
         /// A subarray starts: v_00 comes next, and its saturations are counted from 0.
         in start;
         /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
@@ -94,8 +94,8 @@ impl Block for Rescale {
         let collected = k.wire("collected", collecting.q & io.quad_valid);
         let complete = k.wire("complete", collected & limb_sum.complete);
         collecting.d.set((started.q | (collecting.q & !(complete & rows.last))) & !io.rst);
-        rows.which.set(io.which);
-        reads.which.set(io.which);
+        rows.case_index.set(io.case_index);
+        reads.case_index.set(io.case_index);
         rows.clear.set(started.q);
         rows.enable.set(collected);
         k.comment("The sum of a row is registered");
@@ -173,10 +173,10 @@ mod tests {
             Rescaling { model, cycle: 0, rows: None, shift: None, saturations: 0, words: None }
         }
 
-        /// Rows of v_00 of case `which`.
-        fn rows(&self, which: usize) -> usize {
+        /// Rows of v_00 of case `case_index`.
+        fn rows(&self, case_index: usize) -> usize {
             let limbs = if self.model.formats().limb_align > 0 { 2 } else { 1 };
-            limbs * self.model.cases()[which].formats.quads
+            limbs * self.model.cases()[case_index].formats.quads
         }
 
         /// All words have been output two cycles ago.
@@ -208,10 +208,10 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, which, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
+            let [rst, case_index, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
             let formats = self.model.formats();
             let quad = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.lane_bits as usize));
-            let all = self.rows(which);
+            let all = self.rows(case_index);
             let mut words = self.words.take();
             if let (1, Some(due)) = (valid, &mut words) {
                 let mut add = |rows: &[[i64; 4]], shift: u32, latency: usize| {
@@ -227,7 +227,7 @@ mod tests {
                             self.rows = Some(rows);
                         } else {
                             let limbs: Vec<_> =
-                                rows.chunks(self.model.cases()[which].formats.quads).map(<[_]>::to_vec).collect();
+                                rows.chunks(self.model.cases()[case_index].formats.quads).map(<[_]>::to_vec).collect();
                             let raw = join_limbs(formats, &limbs);
                             let shift = shift(formats, raw_length(&raw));
                             add(&raw, shift, LATENCY[0]);
@@ -254,39 +254,39 @@ mod tests {
         // Reset, case, start, a row.
         let mut cycles: Vec<(bool, usize, bool, bool)> = vec![(true, 0, false, false)];
         for _ in 0..subarrays {
-            let which = random.usize(..model.cases().len());
-            let quads = model.cases()[which].formats.quads;
+            let case_index = random.usize(..model.cases().len());
+            let quads = model.cases()[case_index].formats.quads;
             let (gaps, first) = (random.u8(..4), cycles.len());
-            cycles.push((false, which, true, false));
-            cycles.extend([(false, which, false, false); 4]);
+            cycles.push((false, case_index, true, false));
+            cycles.extend([(false, case_index, false, false); 4]);
             let rows = |cycles: &mut Vec<_>, random: &mut fastrand::Rng, count: usize| {
                 for _ in 0..count {
                     let gap = if random.u8(..4) < gaps { random.usize(..4) } else { 0 };
-                    cycles.extend(vec![(false, which, false, false); gap]);
-                    cycles.push((false, which, false, true));
+                    cycles.extend(vec![(false, case_index, false, false); gap]);
+                    cycles.push((false, case_index, false, true));
                 }
             };
-            rows(&mut cycles, &mut random, Rescaling::new(model).rows(which));
-            cycles.extend(vec![(false, which, false, false); quads + LATENCY[0]]);
+            rows(&mut cycles, &mut random, Rescaling::new(model).rows(case_index));
+            cycles.extend(vec![(false, case_index, false, false); quads + LATENCY[0]]);
             let more = random.usize(..60);
             rows(&mut cycles, &mut random, more);
-            cycles.extend([(false, which, false, false); 8]);
+            cycles.extend([(false, case_index, false, false); 8]);
             if random.u8(..5) == 0 {
                 cycles.truncate(random.usize(first + 1..cycles.len()));
-                cycles.push((true, which, false, false));
+                cycles.push((true, case_index, false, false));
             }
         }
         let magnitude = formats.acc_bits.min(formats.lane_bits + formats.limb_align) - formats.limb_align - 2;
         let mut quieter = 0;
         let inputs = |cycle: usize| {
-            let (rst, which, start, valid) = cycles[cycle];
+            let (rst, case_index, start, valid) = cycles[cycle];
             let soon = cycles.get(cycle + 2).is_some_and(|(.., valid)| *valid);
             if start {
                 quieter = random.u32(..magnitude);
             }
             let quad = [(); 4].map(|()| random.i64(-(1 << magnitude)..1 << magnitude) >> quieter);
             let quad = Word::of_fields(&quad, formats.lane_bits as usize);
-            vec![rst.into(), Word::from(which as u64), start.into(), quad, valid.into(), soon.into()]
+            vec![rst.into(), Word::from(case_index as u64), start.into(), quad, valid.into(), soon.into()]
         };
         (0..cycles.len()).map(inputs).collect()
     }
@@ -301,7 +301,7 @@ mod tests {
                 subject_of!(
                     Rescale::new(&model),
                     changes,
-                    inputs [rst, which, start, quad, quad_valid, quad_soon],
+                    inputs [rst, case_index, start, quad, quad_valid, quad_soon],
                     outputs [words, words_valid, operands, operands_valid, shift, saturations],
                 )
             };

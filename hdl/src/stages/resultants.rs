@@ -239,20 +239,20 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, pa
     begun.set(concat(&(0..count).rev().map(begins).collect::<Vec<_>>()));
     let has_begun = pick(at, &(0..count).map(|part| begun.at(part)).collect::<Vec<_>>());
     let has_begun = k.wire("has_begun", has_begun);
-    let kept = |name: &str, bits: usize| {
+    let part_memory = |name: &str, bits: usize| {
         let memory = k.memory(name, count, bits, Contents::Undefined);
         let present = k.wire(&format!("{name}_now"), memory.read(at) & has_begun.repeat(bits));
         (memory, present)
     };
     let sum = |(n, value): (usize, &Expr<'_>)| {
-        let (memory, present) = kept(&format!("sum_{n}"), SUM_BITS as usize);
+        let (memory, present) = part_memory(&format!("sum_{n}"), SUM_BITS as usize);
         let present = present.signed();
         memory.write(adds, part_2, (present + *value).resize(SUM_BITS as usize).unsigned());
         present.extend(WIDE).unsigned()
     };
     let mut all: Vec<Expr> = values.iter().enumerate().map(sum).collect();
     if summed.counts() {
-        let (memory, present) = kept("taxels", count_bits(sensor.taxels() + 1));
+        let (memory, present) = part_memory("taxels", count_bits(sensor.taxels() + 1));
         memory.write(adds, part_2, present.plus(1));
         all.push(present.extend(WORD));
     }

@@ -38,9 +38,9 @@ block! {
         clock;
         reset;
         /// Index of the case of the frame that is searched; constant until its values have been output.
-        in which: count_bits(*cases);
+        in case_index: count_bits(*cases);
         /// Index of the case of the frame that is written; constant until its last coefficient.
-        in fill_which: count_bits(*cases);
+        in fill_case: count_bits(*cases);
         /// One coefficient of four taxels, signed; valid with `fill`.
         in fill_quad: 4 * fill_bits;
         /// `fill_quad` holds a coefficient.
@@ -231,14 +231,14 @@ impl Sweeps {
 
     fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
         let s = &self.parts.place(k);
-        s.bias.which.set(io.which);
-        s.quads.which.set(io.which);
-        s.period.which.set(io.which);
+        s.bias.case_index.set(io.case_index);
+        s.quads.case_index.set(io.case_index);
+        s.period.case_index.set(io.case_index);
         self.fill(k, s, &io);
         set_up(k, s, &io);
         let quad_end = quads(k, s, io.rst);
         sum_polynomial(k, s);
-        self.score(k, s, io.which, quad_end);
+        self.score(k, s, io.case_index, quad_end);
         output(k, s, &io, quad_end);
         k.unused([s.period.value]);
     }
@@ -253,12 +253,12 @@ impl Sweeps {
         s.sum.fill.set(io.fill);
         s.sum.fill_index.set(io.fill_index);
         s.sum.fill_address.set(io.fill_address);
-        s.sum.fill_mask.set(self.fill_mask.of(k, "fill_mask", io.fill_which, || io.fill_address));
+        s.sum.fill_mask.set(self.fill_mask.of(k, "fill_mask", io.fill_case, || io.fill_address));
         s.sum.fill_quad.set(io.fill_quad);
     }
 
     /// The candidates of the quads are scored, and compared after the last one.
-    fn score<'k>(&'k self, k: &'k Builder, s: &Placed<'k>, which: Expr<'k>, quad_end: Expr<'k>) {
+    fn score<'k>(&'k self, k: &'k Builder, s: &Placed<'k>, case_index: Expr<'k>, quad_end: Expr<'k>) {
         k.comment("Scores and their comparison");
         s.scored.d.set(s.trial.q);
         s.first.d.set(s.go.q);
@@ -269,7 +269,7 @@ impl Sweeps {
             scored_address.d.set(s.moved_address.q);
             scored_address.q
         };
-        s.scores.mask.set(self.lane_mask.of(k, "lane_mask", which, address));
+        s.scores.mask.set(self.lane_mask.of(k, "lane_mask", case_index, address));
         s.scores.values.set(s.candidates.values);
         s.scores.sums.set(s.sum_candidates.values);
         s.totals.d.set(quad_end & !s.sequencer.last);

@@ -34,12 +34,12 @@ use dermis_golden::spec::quads::Quads;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::count_bits;
-use shape::Shape;
+use params::SegmentParams;
 
 mod basins;
 mod control;
 mod labels;
-mod shape;
+mod params;
 mod walk;
 
 block! {
@@ -52,7 +52,7 @@ block! {
         contact_bits: usize,
         /// Width of a label.
         label_bits: usize,
-        shape: Shape,
+        params: SegmentParams,
     }
     ports SegmentPorts {
         clock;
@@ -99,15 +99,15 @@ impl Segment {
 
     /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
     pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
-        let shape = Shape::new(segmentation, lane, low);
-        let (contact_bits, label_bits) = (count_bits(shape.most), shape.label());
-        Segment { layout: segmentation.quads(), lane, contact_bits, label_bits, shape }
+        let params = SegmentParams::new(segmentation, lane, low);
+        let (contact_bits, label_bits) = (count_bits(params.most), params.label());
+        Segment { layout: segmentation.quads(), lane, contact_bits, label_bits, params }
     }
 }
 
 impl Block for Segment {
     fn build<'k>(&'k self, k: &'k Builder, io: SegmentPorts<Inside<'k>>) {
-        io.circuit(k, &self.shape);
+        io.circuit(k, &self.params);
     }
 }
 

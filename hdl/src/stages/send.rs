@@ -22,7 +22,7 @@ block! {
         clock;
         reset;
         /// Index of the case of the frame being sent; constant until its last beat.
-        in which: count_bits(subarrays.len());
+        in case_index: count_bits(subarrays.len());
         /// The frame's first values are available: start requesting beats.
         in start;
         /// The first values of a subarray are available; with `start` those of the first.
@@ -72,8 +72,8 @@ impl Block for Send {
         let status = k.instance("status", Dff {});
         let out = k.instance("out", BitDelay::new(1));
 
-        scan.which.set(io.which);
-        parts.which.set(io.which);
+        scan.case_index.set(io.case_index);
+        parts.case_index.set(io.case_index);
         let open = released.map(|released| {
             released.begins.set(io.begins);
             released.first.set(io.start);
@@ -167,10 +167,10 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, which, start, begins, valid, ready, last] =
+            let [rst, case_index, start, begins, valid, ready, last] =
                 [0, 1, 2, 3, 4, 5, 6].map(|input| inputs[input].number());
             let beats =
-                self.model.scene.sensor.taxels() + self.model.status_beats_of(&self.model.cases()[which as usize]);
+                self.model.scene.sensor.taxels() + self.model.status_beats_of(&self.model.cases()[case_index as usize]);
             let next = self.beat.map(|beat| beat + usize::from(self.request(inputs).is_some()));
             self.beat = if start == 1 { Some(0) } else { next.filter(|&beat| beat < beats) };
             self.begun = if start == 1 { 1 } else { self.begun + begins as usize };
@@ -193,17 +193,17 @@ mod tests {
     fn requests_are_in_order(model: &Model, has_defects: bool) {
         let mut random = fastrand::Rng::with_seed(9);
         let mut sending = Sending::new(model);
-        let mut which = 0;
+        let mut case_index = 0;
         let cycle = |cycle: usize| {
             let rst = cycle < 2 || random.u16(..1000) == 0;
             let start = !rst && sending.beat.is_none() && random.u8(..10) == 0;
             if start {
-                which = random.usize(..model.cases().len());
+                case_index = random.usize(..model.cases().len());
             }
-            let more = sending.beat.is_some() && sending.begun < model.cases()[which].parts.len();
+            let more = sending.beat.is_some() && sending.begun < model.cases()[case_index].parts.len();
             let bits = [start, start || (more && random.u8(..80) == 0), random.bool(), random.bool(), random.bool()];
             let bits = bits.into_iter().chain([random.u8(..4) > 0]).map(Word::from);
-            let inputs: Vec<Word> = [Word::from(rst), Word::from(which as u64)].into_iter().chain(bits).collect();
+            let inputs: Vec<Word> = [Word::from(rst), Word::from(case_index as u64)].into_iter().chain(bits).collect();
             sending.clock(&inputs);
             inputs
         };
@@ -212,7 +212,7 @@ mod tests {
             subject_of!(
                 Send::new(model),
                 changes,
-                inputs [rst, which, start, begins, m_axis_tvalid, m_axis_tready, m_axis_tlast, room],
+                inputs [rst, case_index, start, begins, m_axis_tvalid, m_axis_tready, m_axis_tlast, room],
                 outputs [offer, beat, part, address, lane, done],
             )
         };

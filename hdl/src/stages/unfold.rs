@@ -23,7 +23,7 @@ block! {
         clock;
         reset;
         /// Index of the case; constant while a frame is computed.
-        in which: count_bits(quads.len());
+        in case_index: count_bits(quads.len());
         /// A subarray starts: the words of v_00 come next.
         in start;
         /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
@@ -77,7 +77,7 @@ impl Block for Unfold {
         let finish = k.instance("finish", BitDelay::new(4));
 
         let quad_end = k.wire("quad_end", io.words_valid & quads.last);
-        quads.which.set(io.which);
+        quads.case_index.set(io.case_index);
         quads.clear.set(io.start);
         quads.enable.set(io.words_valid);
         vectors.clear.set(io.start);
@@ -142,8 +142,8 @@ mod tests {
         }
 
         /// The quad of these words, the next of the subarray.
-        fn quad(&self, which: usize, words: [i64; 4]) -> Quad {
-            let formats = &self.model.cases()[which].formats;
+        fn quad(&self, case_index: usize, words: [i64; 4]) -> Quad {
+            let formats = &self.model.cases()[case_index].formats;
             let (vector, address) = (self.next / formats.quads, self.next % formats.quads);
             let [a, b, c, d] = unfold(&[words], EXPONENTS[vector].0 + EXPONENTS[vector].1)[0];
             let last = self.next + 1 == formats.vectors() * formats.quads;
@@ -172,10 +172,10 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, which, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
-            let formats = &self.model.cases()[which].formats;
+            let [rst, case_index, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
+            let formats = &self.model.cases()[case_index].formats;
             let words = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.vector_bits as usize));
-            self.quads.push_front((valid == 1).then(|| self.quad(which, words)));
+            self.quads.push_front((valid == 1).then(|| self.quad(case_index, words)));
             self.quads.truncate(4);
             let all = formats.vectors() * formats.quads;
             self.next = if start == 1 { 0 } else { (self.next + valid) % all };
@@ -192,23 +192,23 @@ mod tests {
         for model in [shared, model(8, 8, "[partition]\ncases = [0, 1]\n")] {
             let bits = 4 * model.formats().vector_bits as usize;
             let mut random = fastrand::Rng::with_seed(11);
-            let mut which = 0;
+            let mut case_index = 0;
             let cycle = |cycle: usize| {
                 let rst = cycle == 0 || random.u16(..500) == 0;
                 let start = cycle == 1 || random.u16(..150) == 0;
                 if start {
-                    which = random.usize(..model.cases().len());
+                    case_index = random.usize(..model.cases().len());
                 }
                 let valid = cycle > 1 && !start && random.u8(..5) > 0;
                 let words = random_word(&mut random, bits);
-                vec![rst.into(), Word::from(which as u64), start.into(), words, valid.into()]
+                vec![rst.into(), Word::from(case_index as u64), start.into(), words, valid.into()]
             };
             let stimulus: Vec<Vec<Word>> = (0..4000).map(cycle).collect();
             let subject = |changes: &[Change]| {
                 subject_of!(
                     Unfold::new(&model),
                     changes,
-                    inputs [rst, which, start, words, words_valid],
+                    inputs [rst, case_index, start, words, words_valid],
                     outputs [taxels, taxels_valid, index, address, done],
                 )
             };

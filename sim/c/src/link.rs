@@ -16,7 +16,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
-use dermis_host::link::{check_identity, Answer, PhysicalAnswer};
+use dermis_host::link::{check_identity, BoardAnswer, PhysicalAnswer};
 
 use crate::guard::{attempt, copy, dermis_status, exclusive, free, guarded, place, reference, room, values, Error};
 use crate::result::dermis_result;
@@ -83,7 +83,7 @@ impl dermis_link {
             return Ok((dermis_answer::Other, None));
         };
         let bytes = packet.payload.len();
-        let answer = Answer::of_bytes(&self.model, &packet.payload, forces).ok_or_else(|| Error {
+        let answer = BoardAnswer::of_bytes(&self.model, &packet.payload, forces).ok_or_else(|| Error {
             status: dermis_status::Damaged,
             text: format!("an answer of type {} has {bytes} bytes", packet.kind.name()),
         })?;

@@ -18,7 +18,7 @@ use dermis_flow::progress::Progress;
 /// The scene of the guide's tables and pictures.
 pub const SCENE: &str = "sensor-1";
 /// Ports without a timing of their own.
-const LEFT_OUT: [&str; 3] = ["clk", "rst", "which"];
+const LEFT_OUT: [&str; 3] = ["clk", "rst", "case_index"];
 /// Most columns of a picture: cycles and gaps between them.
 const COLUMNS: usize = 26;
 

@@ -40,7 +40,7 @@ pub const LARGE: f64 = 0.01;
 
 /// Counts of the faults in one storage class of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct BitFlipRow {
     /// ROM, RAM or registers.
     pub class: StorageClass,
     /// Stage name.
@@ -76,7 +76,7 @@ pub struct Row {
 ///
 /// # Errors
 /// No Verilator, a design that it refuses, or frames of another sensor.
-pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
+pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<BitFlipRow>> {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut pool = shipped_samples(&hardware.model, frames)?;
     if !pool.iter().any(Sample::has_force) {
@@ -88,7 +88,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
     // Two frames and one after the reset.
     let optimisation = Optimisation::of_cycles(3 * longest * count as u64);
     let mut device = hardware.device_with_open_state(optimisation)?;
-    let mut rows: BTreeMap<(StorageClass, &str), Row> = BTreeMap::new();
+    let mut rows: BTreeMap<(StorageClass, &str), BitFlipRow> = BTreeMap::new();
     let mut found = Vec::new();
     for element in elements {
         let StateElement { scope, signal, words, bits, .. } = element;
@@ -97,7 +97,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         let own = device.find(scope, signal).filter(|own| [(); 2].iter().all(|()| device.flip(*own, word, bit)));
         let Some(own) = own else { bail!("{scope}.{signal}, word {word}, bit {bit} cannot be flipped") };
         found.push(own);
-        let row = rows.entry((element.class, element.stage)).or_insert_with(|| Row::new(element));
+        let row = rows.entry((element.class, element.stage)).or_insert_with(|| BitFlipRow::new(element));
         (row.signals, row.bits) = (row.signals + 1, row.bits + element.words * element.bits);
     }
     let mut flipped = BTreeSet::new();
@@ -148,9 +148,9 @@ fn input_frame(sample: &Sample) -> InputFrame<'_> {
     InputFrame { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len(), array: 0 }
 }
 
-impl Row {
-    fn new(element: &StateElement) -> Row {
-        Row {
+impl BitFlipRow {
+    fn new(element: &StateElement) -> BitFlipRow {
+        BitFlipRow {
             class: element.class,
             stage: element.stage,
             signals: 0,
@@ -209,15 +209,15 @@ pub struct Shares {
 
 impl Shares {
     /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
-    pub fn of(rows: &[Row], class: StorageClass) -> Option<Shares> {
+    pub fn of(rows: &[BitFlipRow], class: StorageClass) -> Option<Shares> {
         let of_class = || rows.iter().filter(move |row| row.class == class);
         let flipped = || of_class().filter(|row| row.flips > 0);
         let weight: usize = flipped().map(|row| row.bits).sum();
-        let share = |count: fn(&Row) -> usize| {
+        let share = |count: fn(&BitFlipRow) -> usize| {
             flipped().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / weight as f64
         };
-        let interval = |count: fn(&Row) -> usize| {
-            let of = |row: &Row| {
+        let interval = |count: fn(&BitFlipRow) -> usize| {
+            let of = |row: &BitFlipRow| {
                 let weight = row.bits as f64 / weight as f64;
                 interval::Stratum { weight, hits: count(row), trials: row.flips }
             };
@@ -245,7 +245,7 @@ mod tests {
     fn intervals_hold_the_share_as_often_as_they_say() {
         // Stages of unlike size and share; 100 flips each.
         const STAGES: [(usize, f64); 3] = [(100, 0.3), (1000, 0.02), (5000, 0.1)];
-        let row = |(bits, silent)| Row {
+        let row = |(bits, silent)| BitFlipRow {
             class: StorageClass::Rom,
             stage: "fold",
             signals: 1,

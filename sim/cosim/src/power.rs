@@ -145,27 +145,27 @@ pub fn estimate_power(hardware: &Hardware, frames: &[Frame]) -> Result<PowerEsti
     let toggles = count_toggles(hardware, frames)?;
     let static_power = power.static_mW(device).ok_or_else(|| no_energies(board))?;
     let large = |stage: &str| {
-        let own = hardware.generated.memories.iter().filter(|own| own.stage(board.engine) == stage);
-        own.map(|own| own.planned.large_rams).sum::<usize>()
+        let memories = hardware.generated.memories.iter().filter(|memory| memory.stage(board.engine) == stage);
+        memories.map(|memory| memory.planned.large_rams).sum::<usize>()
     };
-    let stages = toggles.stages.iter().map(|own| {
-        let usage = hardware.generated.usage.iter().find(|(stage, _)| *stage == own.stage);
+    let stages = toggles.stages.iter().map(|stage| {
+        let usage = hardware.generated.usage.iter().find(|(name, _)| *name == stage.stage);
         let (multipliers, block_rams) = usage.map_or((0, 0), |(_, usage)| (usage.multipliers, usage.block_rams));
-        let busy = (own.toggles / (RANDOM * own.register_bits as f64)).min(toggles.interval);
+        let busy = (stage.toggles / (RANDOM * stage.register_bits as f64)).min(toggles.interval);
         std::array::from_fn(|k| {
-            let words = (block_rams + large(own.stage)) as f64 * power.block_ram_pJ[k];
-            (own.toggles * power.toggle_pJ[k] + busy * (multipliers as f64 * power.product_pJ[k] + words)) / 1e3
+            let words = (block_rams + large(stage.stage)) as f64 * power.block_ram_pJ[k];
+            (stage.toggles * power.toggle_pJ[k] + busy * (multipliers as f64 * power.product_pJ[k] + words)) / 1e3
         })
     });
     let stages_nJ: Vec<Range> = stages.collect();
-    let bits: usize = toggles.stages.iter().map(|own| own.register_bits).sum();
+    let bits: usize = toggles.stages.iter().map(|stage| stage.register_bits).sum();
     // 1 pJ at 1 MHz is 1 µW.
     let clock_mW = power.clock_pJ.map(|energy| bits as f64 * energy * board.clock_MHz / 1e3);
     let fastest = board.clock_MHz * 1e6 / toggles.interval;
     let rates = [("1 kHz", TOUCH_RATE), ("back to back", fastest)].into_iter().filter(|(_, rate)| *rate <= fastest);
     let rates = rates.map(|(name, rate)| {
         // 1 nJ at 1 Hz is 1e-6 mW.
-        let frames = |k: usize| stages_nJ.iter().map(|own| own[k]).sum::<f64>() * rate / 1e6;
+        let frames = |k: usize| stages_nJ.iter().map(|stage_nJ| stage_nJ[k]).sum::<f64>() * rate / 1e6;
         let power_mW = std::array::from_fn(|k| static_power[k] + clock_mW[k] + frames(k));
         Rate { name, frames_per_second: rate, power_mW, frame_uJ: power_mW.map(|power| 1e3 * power / rate) }
     });

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use dermis_golden::result::flags::Flag;
-use dermis_study::stability::extreme::{Outcome, Row};
+use dermis_study::stability::extreme::{ExtremeRow, Outcome};
 use serde_json::json;
 
 use super::csv::quoted;
@@ -22,7 +22,7 @@ const LEGEND: &str =
 ///
 /// # Errors
 /// A number that JSON cannot represent.
-pub fn extremes(all: &[(String, Vec<Row>)], format: Format) -> Result<String> {
+pub fn extremes(all: &[(String, Vec<ExtremeRow>)], format: Format) -> Result<String> {
     let mut text = String::new();
     match format {
         Format::Json => {
@@ -53,7 +53,7 @@ pub fn extremes(all: &[(String, Vec<Row>)], format: Format) -> Result<String> {
 }
 
 /// The extreme frames of one scene.
-pub(super) fn extremes_table(scene: &str, rows: &[Row]) -> Table {
+pub(super) fn extremes_table(scene: &str, rows: &[ExtremeRow]) -> Table {
     let head = [
         "frame",
         "golden, N",

@@ -1,11 +1,11 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use dermis_cosim::faults::{interval, Row, Shares, LARGE};
+use dermis_cosim::faults::{interval, BitFlipRow, Shares, LARGE};
 use dermis_hdl::state::CLASSES;
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
-pub fn faults(rows: &[Row]) -> String {
+pub fn faults(rows: &[BitFlipRow]) -> String {
     let head = [
         "class",
         "stage",
@@ -21,7 +21,7 @@ pub fn faults(rows: &[Row]) -> String {
         "largest error",
         "not recovered",
     ];
-    let line = |row: &Row| {
+    let line = |row: &BitFlipRow| {
         let counts = [
             row.signals,
             row.bits,
@@ -48,16 +48,16 @@ pub fn faults(rows: &[Row]) -> String {
     let head =
         ["of all bits of", "bits", "flipped", "harmless", "detected", "hang", "silent, 95 %", "silent above, 95 %"];
     let of = |class| {
-        let all = Shares::of(rows, class)?;
-        let shares = [all.harmless, all.detected, all.hang];
-        let mut cells = vec![class.name().to_owned(), all.bits.to_string(), all.flips.to_string()];
+        let class_shares = Shares::of(rows, class)?;
+        let shares = [class_shares.harmless, class_shares.detected, class_shares.hang];
+        let mut cells = vec![class.name().to_owned(), class_shares.bits.to_string(), class_shares.flips.to_string()];
         cells.extend(shares.map(|share| percent(Some(share))));
         let with_interval = |share, [low, high]: [f64; 2]| {
             let [share, low, high] = [share, low, high].map(|share| percent(Some(share)));
             format!("{share} ({low} … {high})")
         };
-        cells.push(with_interval(all.silent, all.silent_interval));
-        cells.push(with_interval(all.large, all.large_interval));
+        cells.push(with_interval(class_shares.silent, class_shares.silent_interval));
+        cells.push(with_interval(class_shares.large, class_shares.large_interval));
         Some(cells)
     };
     text.push_str(&aligned(1, &head, CLASSES.into_iter().filter_map(of).collect()));

@@ -6,10 +6,10 @@ use dermis_golden::wire::link::{payloads, supports, Kind};
 
 use super::network;
 use super::table::{aligned, significant_digits};
-use dermis_host::link::{Answer, PhysicalAnswer};
+use dermis_host::link::{BoardAnswer, PhysicalAnswer};
 
 /// The resultants of one frame.
-pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> String {
+pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &BoardAnswer) -> String {
     let largest = physical.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
     let [x, y, normal] = physical.resultant_N.map(|force| sign(force).to_owned() + &significant_digits(force, largest));
@@ -24,7 +24,7 @@ pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> St
 }
 
 /// Whether an answer equals the bit-true model's, if compared, and whether the board has dropped a packet before it.
-pub fn equality(answer: &Answer) -> String {
+pub fn equality(answer: &BoardAnswer) -> String {
     let checked = match &answer.difference {
         None => String::new(),
         Some(None) => "against model   equal, every bit\n".to_owned(),

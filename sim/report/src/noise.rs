@@ -1,7 +1,7 @@
 //! The noise table as Markdown, CSV and JSON.
 
 use anyhow::Result;
-use dermis_study::noise::{Row, Spread};
+use dermis_study::noise::{NoiseRow, Spread};
 
 use super::table::{aligned, markdown, percent};
 use super::Format;
@@ -10,7 +10,7 @@ use super::Format;
 ///
 /// # Errors
 /// A number that JSON cannot represent.
-pub fn noise(rows: &[Row], format: Format) -> Result<String> {
+pub fn noise(rows: &[NoiseRow], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
         Format::Csv => csv(rows),
@@ -18,7 +18,7 @@ pub fn noise(rows: &[Row], format: Format) -> Result<String> {
     })
 }
 
-fn text(rows: &[Row]) -> String {
+fn text(rows: &[NoiseRow]) -> String {
     let head = [
         "noise",
         "frames",
@@ -59,8 +59,8 @@ fn text(rows: &[Row]) -> String {
 
 /// Median errors: a line per noise level and number of averaged frames, a column per objective, then the bound of the six
 /// unknowns.
-pub fn noise_medians(rows: &[Row]) -> String {
-    let lines: Vec<&[Row]> = rows.chunk_by(|a, b| (a.noise, a.frames) == (b.noise, b.frames)).collect();
+pub fn noise_medians(rows: &[NoiseRow]) -> String {
+    let lines: Vec<&[NoiseRow]> = rows.chunk_by(|a, b| (a.noise, a.frames) == (b.noise, b.frames)).collect();
     let objectives = lines.first().into_iter().flat_map(|line| line.iter()).map(|row| format!("`{}`", row.objective));
     let head: Vec<String> = ["noise", "frames"]
         .map(str::to_owned)
@@ -68,7 +68,7 @@ pub fn noise_medians(rows: &[Row]) -> String {
         .chain(objectives)
         .chain(["Cramér–Rao bound".into()])
         .collect();
-    let line = |rows: &[Row]| {
+    let line = |rows: &[NoiseRow]| {
         let mut cells = vec![percent(Some(rows[0].noise)), rows[0].frames.to_string()];
         cells.extend(rows.iter().map(|row| percent(Some(row.found.median))));
         cells.push(percent(Some(rows[0].bound_6.median)));
@@ -78,7 +78,7 @@ pub fn noise_medians(rows: &[Row]) -> String {
     aligned(2, &head, lines.into_iter().map(line).collect())
 }
 
-fn csv(rows: &[Row]) -> String {
+fn csv(rows: &[NoiseRow]) -> String {
     let mut text = "noise,frames,objective,median,ninety,rms,bound6_median,bound6_ninety,bound6_rms,\
                     bound9_median,bound9_ninety,bound9_rms,ratio6,ratio9\n"
         .to_owned();
@@ -106,9 +106,9 @@ mod tests {
     use super::*;
     use serde_json::Value;
 
-    fn rows() -> Vec<Row> {
+    fn rows() -> Vec<NoiseRow> {
         let spread = |by: f64| Spread { median: by / 3.0, ninety: 2.0 * by, rms: 0.1 * by };
-        let noisy = Row {
+        let noisy = NoiseRow {
             noise: 1e-4,
             frames: 64,
             objective: "patch",
@@ -118,12 +118,13 @@ mod tests {
             ratio_6: Some(2.0),
             ratio_9: Some(4.0),
         };
-        let silent = Row { noise: 0.0, frames: 1, bound_6: spread(0.0), ratio_6: None, ratio_9: None, ..noisy.clone() };
+        let silent =
+            NoiseRow { noise: 0.0, frames: 1, bound_6: spread(0.0), ratio_6: None, ratio_9: None, ..noisy.clone() };
         vec![noisy, silent]
     }
 
     /// Every number of a row with its CSV column and its JSON pointer.
-    fn numbers(row: &Row) -> [(&'static str, &'static str, Option<f64>); 12] {
+    fn numbers(row: &NoiseRow) -> [(&'static str, &'static str, Option<f64>); 12] {
         [
             ("noise", "/noise", Some(row.noise)),
             ("median", "/found/median", Some(row.found.median)),
@@ -172,7 +173,7 @@ mod tests {
     #[test]
     fn medians_stand_by_level_and_objective() {
         let [noisy, silent] = &rows()[..] else { panic!("two rows") };
-        let other = Row { objective: "auto", found: silent.bound_6, ..noisy.clone() };
+        let other = NoiseRow { objective: "auto", found: silent.bound_6, ..noisy.clone() };
         let text = noise_medians(&[noisy.clone(), other, silent.clone(), silent.clone()]);
         let wanted = [
             "| noise  | frames | `patch` | `auto` | Cramér–Rao bound |",

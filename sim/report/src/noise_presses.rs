@@ -39,7 +39,7 @@ fn text(rows: &[PressRow]) -> String {
         group.chunk_by(|a, b| a.mean == b.mean).map(<[PressRow]>::to_vec).collect()
     };
     let names: Vec<String> =
-        groups.first().map_or(Vec::new(), |group| means(group).iter().map(|own| own[0].mean.clone()).collect());
+        groups.first().map_or(Vec::new(), |group| means(group).iter().map(|by_mean| by_mean[0].mean.clone()).collect());
     let lags: Vec<String> = names.iter().skip(1).map(|name| format!("lag, {name}")).collect();
     let head = ["noise", "estimator", "motion"].into_iter().chain(names.iter().map(String::as_str));
     let head: Vec<&str> =
@@ -48,15 +48,15 @@ fn text(rows: &[PressRow]) -> String {
     for group in groups {
         let means = means(group);
         for motion in 0..means[0].len() {
-            let own: Vec<&PressRow> = means.iter().map(|rows| &rows[motion]).collect();
-            let Some(last) = own.last() else { continue };
+            let by_mean: Vec<&PressRow> = means.iter().map(|rows| &rows[motion]).collect();
+            let Some(last) = by_mean.last() else { continue };
             let share = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{:.0} %", 100.0 * value));
             let error =
                 |row: &&PressRow| row.tangential.map(|share| format!("{:.1}", 100.0 * share)).join(" / ") + " %";
             let lag = |row: &&PressRow| row.lag_frames.map_or("-".to_string(), |lag| format!("{lag:.0}"));
             let mut line = vec![percent(Some(last.noise)), last.estimator.clone(), last.motion.to_string()];
-            line.extend(own.iter().map(error));
-            line.extend(own.iter().skip(1).map(lag));
+            line.extend(by_mean.iter().map(error));
+            line.extend(by_mean.iter().skip(1).map(lag));
             line.extend([share(last.held), share(last.within_1)]);
             line.extend([0, 1].map(|k| percent(last.bound.map(|bound| bound[k]))));
             lines.push(line);

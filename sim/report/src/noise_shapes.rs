@@ -84,7 +84,7 @@ fn conditions(rows: &[ShapeRow]) -> String {
         row.frames,
         of(row.gain_spread),
         if row.unipolar { "unipolar" } else { "bipolar" },
-        if row.told { "stated in the scene" } else { "not stated" },
+        if row.noise_stated { "stated in the scene" } else { "not stated" },
     )
 }
 
@@ -332,7 +332,7 @@ fn csv(rows: &[ShapeRow]) -> String {
             row.frames,
             row.gain_spread,
             row.unipolar,
-            row.told,
+            row.noise_stated,
             row.contacts,
             row.shape,
             row.estimator,
@@ -364,7 +364,7 @@ mod tests {
             frames: 64,
             gain_spread: 0.01,
             unipolar: true,
-            told: false,
+            noise_stated: false,
             contacts: 2,
             shape: "ring",
             estimator: estimator.into(),

@@ -22,9 +22,9 @@ pub(super) fn range(ends: [f64; 2]) -> String {
 /// A row per stage; then power and energy per frame at each rate, beside the published power.
 pub fn power(estimate: &PowerEstimate) -> String {
     let toggles = &estimate.toggles;
-    let stages = toggles.stages.iter().zip(&estimate.stages_nJ).map(|(own, energy)| {
-        let bits = own.register_bits.to_string();
-        vec![own.stage.to_owned(), bits, format!("{:.0}", own.toggles), range(*energy)]
+    let stages = toggles.stages.iter().zip(&estimate.stages_nJ).map(|(stage, energy)| {
+        let bits = stage.register_bits.to_string();
+        vec![stage.stage.to_owned(), bits, format!("{:.0}", stage.toggles), range(*energy)]
     });
     let mut text = aligned(1, &["stage", "register bits", "changes per frame", "nJ per frame"], stages.collect());
     text.push_str(&format!(
@@ -45,8 +45,8 @@ pub fn power(estimate: &PowerEstimate) -> String {
     text.push_str(&aligned(1, &["power", "frames per second", "mW", "µJ per frame"], rows));
     text.push_str(&format!("{} at {} MHz. {WHAT}.\n", estimate.device, estimate.clock_MHz));
     for published in powers() {
-        let own = [published.system, published.sensor, published.source];
-        text.push_str(&format!("{}, {}: {} W ({})\n", own[0], own[1], published.power_W, own[2]));
+        let columns = [published.system, published.sensor, published.source];
+        text.push_str(&format!("{}, {}: {} W ({})\n", columns[0], columns[1], published.power_W, columns[2]));
     }
     text.push_str(&format!("energies: {}\n", estimate.source));
     text

@@ -36,11 +36,11 @@ pub fn program(model: &Model) -> String {
         return String::new();
     }
     let several = model.chooses();
-    let rows = program.into_iter().map(|own| {
-        let section = if several { format!("case {}, {}", own.case, own.section) } else { own.section.to_owned() };
-        let [step, group, flip] = [own.step, own.group, own.flip].map(|number| number.to_string());
-        let [coefficients, cycles] = [own.coefficients, own.cycles].map(|number| number.to_string());
-        vec![section, own.matrix, own.operand, own.result, step, group, flip, coefficients, cycles]
+    let rows = program.into_iter().map(|run| {
+        let section = if several { format!("case {}, {}", run.case, run.section) } else { run.section.to_owned() };
+        let [step, group, flip] = [run.step, run.group, run.flip].map(|number| number.to_string());
+        let [coefficients, cycles] = [run.coefficients, run.cycles].map(|number| number.to_string());
+        vec![section, run.matrix, run.operand, run.result, step, group, flip, coefficients, cycles]
     });
     let head = ["runs", "matrix", "operand", "result", "step", "row group", "flip", "first word", "cycles"];
     format!("\nprogram of the passes:\n{}", aligned(4, &head, rows.collect()))

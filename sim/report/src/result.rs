@@ -81,13 +81,18 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
         let place = centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
         writeln!(text, "contact at {place}, N   x {}   y {}   normal {}", along(0), along(1), along(2))
     };
-    for own in result.contacts().into_iter().flatten() {
-        let [x, y] = own.shear_sigma_N.map_or([None; 2], |sigma| sigma.map(Some));
-        contact(own.centre_mm, own.force_N, [x, y, own.normal_sigma_N])?;
+    for found in result.contacts().into_iter().flatten() {
+        let [x, y] = found.shear_sigma_N.map_or([None; 2], |sigma| sigma.map(Some));
+        contact(found.centre_mm, found.force_N, [x, y, found.normal_sigma_N])?;
     }
     if !result.extra.missing.is_empty() {
-        let names: Vec<String> =
-            result.extra.missing.iter().take(SHOWN).map(|own| format!("row {}, column {}", own.row, own.col)).collect();
+        let names: Vec<String> = result
+            .extra
+            .missing
+            .iter()
+            .take(SHOWN)
+            .map(|taxel| format!("row {}, column {}", taxel.row, taxel.col))
+            .collect();
         let more = result.extra.missing.len() - names.len();
         let more = if more > 0 { format!("; {more} more") } else { String::new() };
         writeln!(text, "missing         {}{more}", names.join("; "))?;

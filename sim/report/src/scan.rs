@@ -10,7 +10,7 @@ use dermis_cosim::Mismatch;
 
 /// A scanned frame as JSON.
 #[derive(Serialize)]
-struct Row {
+struct ScanRow {
     frame: String,
     resultant_N: [f64; 3],
     flags: Vec<Flag>,
@@ -29,7 +29,7 @@ pub struct ScanReport {
     runs: Vec<String>,
     scan_cycles: u64,
     period_cycles: u64,
-    frames: Vec<Row>,
+    frames: Vec<ScanRow>,
     mismatches: usize,
     first_mismatches: Vec<Mismatch>,
 }
@@ -40,7 +40,7 @@ impl ScanReport {
         let (model, findings) = (&verified.model, &verified.findings);
         let timing = model.scan_timing()?;
         let us = |cycles: u64| cycles as f64 / model.board.clock_MHz;
-        let row = |row: &ScannedFrame| Row {
+        let row = |row: &ScannedFrame| ScanRow {
             frame: row.frame.clone(),
             resultant_N: row.result.resultant_N,
             flags: row.result.flags.clone(),

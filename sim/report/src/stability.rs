@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use dermis_golden::spec::scene::Medium;
-use dermis_study::stability::{FormatErrors, Row, Spectrum};
+use dermis_study::stability::{FormatErrors, Spectrum, StabilityRow};
 
 use super::csv::quoted;
 use super::data::markdown;
@@ -13,7 +13,7 @@ use super::Format;
 ///
 /// # Errors
 /// A number that JSON cannot represent.
-pub fn stability(rows: &[Row], format: Format) -> Result<String> {
+pub fn stability(rows: &[StabilityRow], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
         Format::Csv => csv(rows),
@@ -26,14 +26,14 @@ const LEGEND: &str = "rank: Σ λ f(λ); gain: ‖Cz⁺‖ in N/MPa; r: spectral
                       without shear; residual: ‖b − C x‖/‖b‖; e_n, e_t: errors of the resultant with shear; bits: \
                       smallest input width for a forward error within 1 % of f64's; –: refused or not applicable";
 
-fn text(rows: &[Row]) -> String {
+fn text(rows: &[StabilityRow]) -> String {
     let mut text = format!("{}\n{LEGEND}\n", markdown(&stability_table(rows)));
     refusals(rows).iter().for_each(|reason| text.push_str(&format!("- {reason}\n")));
     text
 }
 
 /// The reasons of refusals, each once.
-pub(super) fn refusals(rows: &[Row]) -> Vec<&String> {
+pub(super) fn refusals(rows: &[StabilityRow]) -> Vec<&String> {
     let mut reasons: Vec<&String> = Vec::new();
     for reason in rows.iter().flat_map(|row| row.refused.iter().chain(&row.fixed_refused)) {
         if !reasons.contains(&reason) {
@@ -44,7 +44,7 @@ pub(super) fn refusals(rows: &[Row]) -> Vec<&String> {
 }
 
 /// Error against condition number, one row per scene.
-pub(super) fn stability_table(rows: &[Row]) -> Table {
+pub(super) fn stability_table(rows: &[StabilityRow]) -> Table {
     let head = [
         "varied",
         "taxels",
@@ -72,7 +72,7 @@ pub(super) fn stability_table(rows: &[Row]) -> Table {
     Table::new("stability", format!("All scenes. {LEGEND}"), &head, rows.iter().map(line).collect())
 }
 
-fn line(row: &Row) -> Vec<Cell> {
+fn line(row: &StabilityRow) -> Vec<Cell> {
     let sensor = &row.sensor;
     let of = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> f64| scientific(figures.as_ref().map(pick));
     let error = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> Option<f64>| {
@@ -117,7 +117,7 @@ fn medium(medium: Medium) -> String {
     }
 }
 
-fn csv(rows: &[Row]) -> String {
+fn csv(rows: &[StabilityRow]) -> String {
     let mut text = "varied,rows,cols,pitch_x_mm,pitch_y_mm,thickness_mm,medium,poisson,inverse,level,condition,rank,\
                     gain,radius,degree"
         .to_owned();
@@ -166,7 +166,7 @@ mod tests {
     use dermis_golden::spec::scene::Scene;
     use dermis_study::stability::{measure, Setting};
 
-    fn rows() -> Vec<Row> {
+    fn rows() -> Vec<StabilityRow> {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let mut wide = scene.clone();
         wide.sensor.thickness_mm = 40.0;

@@ -49,7 +49,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<String> {
     let Arguments { scene, spreads, presses, noise, draws, seed, model, json } = arguments;
     let defaults = BlindStudy::default();
-    let asked = BlindStudy {
+    let study = BlindStudy {
         spreads: if spreads.is_empty() { defaults.spreads.clone() } else { spreads.clone() },
         presses: *presses as usize,
         noise: *noise,
@@ -58,5 +58,5 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         candidate: if *model { Candidate::Scene } else { Candidate::Hardware },
         ..defaults
     };
-    blind_gains::run(scene, &asked, *json)
+    blind_gains::run(scene, &study, *json)
 }

@@ -75,7 +75,7 @@ impl FromStr for LoadFile {
 
 /// The JSON of the command.
 #[derive(Serialize)]
-struct Answer<'a> {
+struct CalibrationJson<'a> {
     scene: &'a str,
     table: Option<String>,
     loads: usize,
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if !arguments.json {
         return Ok(report::calibration(&fit, &stand, &lines(&fields)));
     }
-    let answer = Answer {
+    let answer = CalibrationJson {
         scene: &scene.name,
         table,
         loads: loads.len(),

@@ -111,10 +111,10 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     };
     let noise_not_stated = noise_not_stated(&scene)?;
     let (peak_MPa, with_hardware) = (arguments.peak, hardware.is_some());
-    let asked = Expectation { peak_MPa, draws: arguments.draws as usize, seed: arguments.seed, with_hardware };
+    let expectation = Expectation { peak_MPa, draws: arguments.draws as usize, seed: arguments.seed, with_hardware };
     let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
-    let errors = expected(&scene, &asked, &noise, &progress)
-        .and_then(|own| Ok((own, of_other_medium(&scene, &asked, &noise, &progress)?)));
+    let errors = expected(&scene, &expectation, &noise, &progress)
+        .and_then(|errors| Ok((errors, of_other_medium(&scene, &expectation, &noise, &progress)?)));
     // A tiny array has no room for the contacts; the rest of the check still stands.
     let ((errors, other_medium), not_drawn) = match errors {
         Ok(errors) => (errors, None),
@@ -132,8 +132,8 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         checked_as: "scene",
         medium: scene.medium.to_string(),
         estimator: golden.estimator().name(),
-        degree: matrices.map(|own| own.degree),
-        spectral_radius: matrices.map(|own| own.spectral_radius),
+        degree: matrices.map(|matrices| matrices.degree),
+        spectral_radius: matrices.map(|matrices| matrices.spectral_radius),
         mu_max: scene.search.mu_max,
         dead: scene.input.dead.clone(),
         board: scene.hardware.board_name().to_owned(),

@@ -9,7 +9,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
-use dermis_cosim::faults::{inject_faults, Row};
+use dermis_cosim::faults::{inject_faults, BitFlipRow};
 use dermis_cosim::hardware::Hardware;
 use dermis_hdl::state::{StorageClass, CLASSES};
 use dermis_report as report;
@@ -38,9 +38,9 @@ const EXAMPLES: &str = "Examples:
   dermis faults eight-by-eight --count 20 --json";
 
 /// The counts of a class for the run log.
-fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -> TargetCounts {
+fn target_counts(scene: &str, class: StorageClass, rows: &[BitFlipRow], seconds: f64) -> TargetCounts {
     let own = || rows.iter().filter(move |row| row.class == class);
-    let sum = |count: fn(&Row) -> usize| own().map(count).sum::<usize>() as u64;
+    let sum = |count: fn(&BitFlipRow) -> usize| own().map(count).sum::<usize>() as u64;
     let counts = [
         ("harmless", sum(|row| row.harmless)),
         ("detected", sum(|row| row.detected)),

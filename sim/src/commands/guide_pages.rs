@@ -167,7 +167,7 @@ fn markdown_files(root: &Path, folder: &Path) -> Result<Vec<String>> {
 
 /// Writes the tables of each page; which page has how many, and how many of them changed.
 fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
-    let mut told = String::new();
+    let mut lines = String::new();
     for page in pages.iter().filter(|page| !page.markers.is_empty()) {
         let mut text = page.text.clone();
         let mut changed = 0;
@@ -181,9 +181,9 @@ fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
         if text != page.text {
             write(&root.join(&page.name), text.as_bytes())?;
         }
-        told.push_str(&format!("{}: {} tables and figures, {changed} changed\n", page.name, page.markers.len()));
+        lines.push_str(&format!("{}: {} tables and figures, {changed} changed\n", page.name, page.markers.len()));
     }
-    Ok(told)
+    Ok(lines)
 }
 
 /// What is to stand behind a marker, and whether it differs from what stands there.
@@ -311,7 +311,7 @@ fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
     if !check {
         files.push(time_picture(build)?);
     }
-    let (mut told, mut stale) = (String::new(), false);
+    let (mut lines, mut stale) = (String::new(), false);
     for PictureFile { name, text } in &files {
         let name = folder.join(name);
         let path = root.join(&name);
@@ -327,9 +327,9 @@ fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
                 "drawn"
             }
         };
-        told.push_str(&format!("{}: {about}\n", name.display()));
+        lines.push_str(&format!("{}: {about}\n", name.display()));
     }
-    Ok((told, !stale))
+    Ok((lines, !stale))
 }
 
 #[cfg(test)]
@@ -353,16 +353,16 @@ mod tests {
     #[test]
     fn tables_are_written_between_their_markers() {
         let folder = tempfile::tempdir().unwrap();
-        let told = fill(&[page(PAGE)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
-        assert_eq!(told, "README.md: 2 tables and figures, 2 changed\n");
+        let lines = fill(&[page(PAGE)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
+        assert_eq!(lines, "README.md: 2 tables and figures, 2 changed\n");
         let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
         let wanted = "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\
                       <!-- end of table -->\n\ntext\n<!-- table: dermis a ; columns: x -->\n|  x |\n|---:|\n|  1 |\n| 30 |\n\
                       <!-- end of table -->\n";
         assert_eq!(text, wanted);
         // A second time nothing changes.
-        let told = fill(&[page(&text)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
-        assert_eq!(told, "README.md: 2 tables and figures, 0 changed\n");
+        let lines = fill(&[page(&text)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
+        assert_eq!(lines, "README.md: 2 tables and figures, 0 changed\n");
     }
 
     #[test]
@@ -398,8 +398,8 @@ mod tests {
         let (text, good) = check(&stale, true, &[of_check]);
         assert!(!good && text.contains("README.md:2: stale: dermis a\n  page:    3\n  command: 2\n"), "{text}");
         assert!(!text.contains("README.md:1:"), "{text}");
-        let told = fill(&[page(&stale)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
-        assert_eq!(told, "README.md: 3 tables and figures, 2 changed\n");
+        let lines = fill(&[page(&stale)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
+        assert_eq!(lines, "README.md: 3 tables and figures, 2 changed\n");
         let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
         assert!(text.starts_with(&format!("{}{}\n# A", figure("1", "p"), figure("30", "q"))), "{text}");
         assert!(check(&text, false, &[("dermis a", NEW)]).1);

@@ -20,7 +20,7 @@ use super::inputs::{frames_of, resolve, BoardOverride};
 use super::layout::LayoutArguments;
 use dermis_flow::progress::Progress;
 use dermis_host::link::stream::{self, FramesSent};
-use dermis_host::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
+use dermis_host::link::{open_board, BoardAnswer, LinkErrors, PhysicalAnswer, Session};
 use dermis_report as report;
 
 /// Arguments of `dermis host`.
@@ -190,7 +190,7 @@ fn refuse(arguments: &Arguments, scene: Option<&Scene>, scans: bool) -> Result<(
 }
 
 /// Asks for a scan and saves its readings.
-fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Frame, Answer)> {
+fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Frame, BoardAnswer)> {
     let (readings, answer) = session.scan(id)?;
     if let Some(folder) = save {
         write(&folder.join(format!("{id}.json")), readings.to_json().as_bytes())?;
@@ -202,13 +202,13 @@ fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Fram
 fn send<R>(
     session: &mut Session,
     requests: &[R],
-    mut ask: impl FnMut(&mut Session, &R) -> Result<(Frame, Answer)>,
+    mut exchange: impl FnMut(&mut Session, &R) -> Result<(Frame, BoardAnswer)>,
 ) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
     let check = CrossCheck::of(&session.model);
     for (index, request) in requests.iter().enumerate() {
-        let (readings, answer) = ask(session, request)?;
+        let (readings, answer) = exchange(session, request)?;
         let checked = |resultant_N: [f64; 3], diagnostics: &mut Diagnostics| {
             check.iter().for_each(|check| check.check(std::slice::from_ref(&readings), resultant_N, diagnostics));
         };

@@ -148,7 +148,9 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
     let listener = TcpListener::bind(listen).map_err(|error| anyhow!("--listen {listen}: {error}"))?;
     let address = listener.local_addr()?;
     if let Some(address) = open_to_others(address) {
-        say!("warning: {address} is open to the network; whoever reaches it sees the frames and moves the finger");
+        say!(
+            "warning: {address} is open to the network; anyone who reaches it sees the frames and can move the finger"
+        );
     }
     let newest = Arc::new(Newest::default());
     let hand = arguments.finger().then(|| Arc::new(Hand::default()));

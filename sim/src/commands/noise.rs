@@ -12,7 +12,7 @@
 use anyhow::Result;
 use clap::Args;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions};
 use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
@@ -150,7 +150,7 @@ struct ShapeArguments {
 
 /// A list of shapes.
 #[derive(Clone, Debug)]
-struct Shapes(Vec<Shape>);
+struct Shapes(Vec<ContactShape>);
 
 /// Runs the study: the table as text.
 ///
@@ -208,21 +208,22 @@ fn candidates(arguments: &Arguments) -> Vec<Candidate> {
 
 /// The study over presses.
 fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<String> {
-    let own = &arguments.time;
+    let press_arguments = &arguments.time;
     let estimators = match arguments.shapes.estimators.as_slice() {
         [] => &[scene.model_estimator()],
         stated => stated,
     };
     let mut engines: Vec<PressEngine> = estimators.iter().copied().map(PressEngine::Golden).collect();
     engines.extend(arguments.shapes.hardware.then_some(PressEngine::Fixed));
-    let all = PressStudy::default();
-    let converter = Converter { gain_spread: own.gains, bits: Some(own.bits), ..Converter::default() };
-    let draw = DrawOptions { converter, seed: arguments.seed, ..all.press.draw };
-    let frames = (own.rate * own.seconds).round() as usize + 1;
-    let press = Press { rate_Hz: own.rate, frames, draw, ..all.press };
-    let mut wanted = PressStudy { engines, presses: own.presses, press, ..all };
-    if !own.motions.is_empty() {
-        wanted.motions = own.motions.clone();
+    let default = PressStudy::default();
+    let converter =
+        Converter { gain_spread: press_arguments.gains, bits: Some(press_arguments.bits), ..Converter::default() };
+    let draw = DrawOptions { converter, seed: arguments.seed, ..default.press.draw };
+    let frames = (press_arguments.rate * press_arguments.seconds).round() as usize + 1;
+    let press = Press { rate_Hz: press_arguments.rate, frames, draw, ..default.press };
+    let mut wanted = PressStudy { engines, presses: press_arguments.presses, press, ..default };
+    if !press_arguments.motions.is_empty() {
+        wanted.motions = press_arguments.motions.clone();
     }
     if !arguments.levels.is_empty() {
         wanted.levels = arguments.levels.clone();
@@ -232,42 +233,42 @@ fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<Str
     report::presses(&rows, format)
 }
 
-fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: Format) -> Result<String> {
-    let own = &arguments.shapes;
+fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[ContactShape], format: Format) -> Result<String> {
+    let shape_arguments = &arguments.shapes;
     let converter = Converter {
-        gain_spread: own.gain_spread,
-        drift: own.drift,
-        tare_frames: own.tare_frames,
+        gain_spread: shape_arguments.gain_spread,
+        drift: shape_arguments.drift,
+        tare_frames: shape_arguments.tare_frames,
         frames: arguments.frames.unwrap_or(1),
-        unipolar: own.unipolar || scene.input.unipolar,
+        unipolar: shape_arguments.unipolar || scene.input.unipolar,
         ..Default::default()
     };
     let options = DrawOptions {
         shapes: shapes.to_vec(),
-        contacts: own.contacts,
-        slip: own.slip,
+        contacts: shape_arguments.contacts,
+        slip: shape_arguments.slip,
         seed: arguments.seed,
         converter,
         ..Default::default()
     };
-    let (draws, told, by_shape) = (arguments.draws, !own.unstated, own.coverage);
+    let (draws, noise_stated, by_shape) = (arguments.draws, !shape_arguments.unstated, shape_arguments.coverage);
     let candidates = candidates(arguments);
-    let mut wanted = ShapeStudy { draws, options, told, candidates, by_shape, ..Default::default() };
+    let mut wanted = ShapeStudy { draws, options, noise_stated, candidates, by_shape, ..Default::default() };
     if !arguments.levels.is_empty() {
         wanted.levels = arguments.levels.clone();
     }
     let bar = Progress::steps(&format!("{}: noise, any shape", scene.name), 0);
     let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
-    if own.sensitivity {
+    if shape_arguments.sensitivity {
         let level = arguments.levels.first().copied().unwrap_or(SENSITIVITY_LEVEL);
         let wanted = ShapeStudy { levels: vec![level], ..wanted };
         return report::sensitivity(&sensitivities(scene, &wanted, &progress)?, level, format);
     }
-    if own.slips {
+    if shape_arguments.slips {
         return report::slips(&slip_study(scene, &wanted, &progress)?, format);
     }
     let rows = shape_study(scene, &wanted, &progress)?;
-    match (arguments.medians, own.coverage, format) {
+    match (arguments.medians, shape_arguments.coverage, format) {
         (true, _, _) => Ok(report::shape_medians(&rows)),
         (false, true, Format::Markdown) => Ok(report::coverage(&rows)),
         _ => report::shapes(&rows, format),

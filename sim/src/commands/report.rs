@@ -160,8 +160,8 @@ fn where_computed(options: &Options) -> Result<Option<Section>> {
     }
     let scenes = DEVICE_SCENES.map(Scene::builtin).into_iter().collect::<Result<Vec<_>, _>>()?;
     let frames = DEVICE_FRAMES as usize;
-    let asked = DeviceOptions { frames, python: None, power: true, build: options.build.clone() };
-    Ok(Some(devices(&measure::devices(&scenes, &asked)?)?))
+    let device_options = DeviceOptions { frames, python: None, power: true, build: options.build.clone() };
+    Ok(Some(devices(&measure::devices(&scenes, &device_options)?)?))
 }
 
 /// The sweeps of the scenes with hardware, each in its recommended case, with contact count and number of frames.

@@ -20,7 +20,7 @@ use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
 use dermis_host::engine::typed;
-use dermis_host::stream::{nanoseconds, seconds, Answer, Estimators, Note, Outcome, Output};
+use dermis_host::stream::{nanoseconds, seconds, Estimators, Note, Outcome, Output, StreamAnswer};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
 const RADIUS_IN_PITCHES: f64 = 2.0;
@@ -132,7 +132,7 @@ impl Hand {
             let result = estimators.next(&frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
             let (line, times_ns) = (sequence + 1, vec![nanoseconds(received); frames.len()]);
-            output(&Outcome::Answer(Answer {
+            output(&Outcome::Answer(StreamAnswer {
                 sequence,
                 line,
                 received_s: seconds(received),

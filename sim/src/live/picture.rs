@@ -5,7 +5,7 @@ use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 use super::newest::Newest;
-use dermis_host::stream::{Answer, Outcome};
+use dermis_host::stream::{Outcome, StreamAnswer};
 
 /// The newest result with its frame.
 #[derive(Serialize)]
@@ -83,8 +83,15 @@ impl<'a> Show<'a> {
             }
             // Said on standard error; the picture has the estimator.
             Outcome::Note(_) => (),
-            Outcome::Answer(Answer {
-                sequence, received_s, answered_s, dropped, estimator, frames, result, ..
+            Outcome::Answer(StreamAnswer {
+                sequence,
+                received_s,
+                answered_s,
+                dropped,
+                estimator,
+                frames,
+                result,
+                ..
             }) => {
                 let Some(frame) = frames.last() else { return Ok(()) };
                 let picture = Picture {

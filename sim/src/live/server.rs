@@ -44,7 +44,7 @@ pub struct Server {
 }
 
 /// An answer: status, further header lines, type, body.
-struct Answer<'a> {
+struct HttpResponse<'a> {
     status: &'a str,
     headers: String,
     kind: &'a str,
@@ -127,7 +127,7 @@ impl Server {
         match (request.method.as_str(), path, &self.hand) {
             ("GET", "/", _) => {
                 let body = self.page.as_bytes();
-                answer(stream, &Answer { kind: "text/html; charset=utf-8", body, ..plain("200 OK", "") }, true)
+                answer(stream, &HttpResponse { kind: "text/html; charset=utf-8", body, ..plain("200 OK", "") }, true)
             }
             ("GET", "/newest", _) => {
                 let Some(Ok(seen)) = query.strip_prefix("after=").map(str::parse) else {
@@ -138,7 +138,7 @@ impl Server {
                 };
                 let headers = format!("Number: {number}\r\n");
                 let body = picture.as_bytes();
-                answer(stream, &Answer { headers, kind: "application/json", body, ..plain("200 OK", "") }, true)
+                answer(stream, &HttpResponse { headers, kind: "application/json", body, ..plain("200 OK", "") }, true)
             }
             ("POST", "/finger", Some(hand)) => match Finger::read(&request.body, &self.scene) {
                 Ok(finger) => {
@@ -158,8 +158,8 @@ pub fn open_to_others(address: SocketAddr) -> Option<SocketAddr> {
     (!address.ip().is_loopback()).then_some(address)
 }
 
-fn plain<'a>(status: &'a str, text: &'a str) -> Answer<'a> {
-    Answer { status, headers: String::new(), kind: "text/plain; charset=utf-8", body: text.as_bytes() }
+fn plain<'a>(status: &'a str, text: &'a str) -> HttpResponse<'a> {
+    HttpResponse { status, headers: String::new(), kind: "text/plain; charset=utf-8", body: text.as_bytes() }
 }
 
 /// A connection whose bytes come and go until a moment, however few at a time.
@@ -201,14 +201,14 @@ impl Write for Until<'_> {
     }
 }
 
-fn answer(stream: &TcpStream, answer: &Answer, more: bool) -> Result<()> {
+fn answer(stream: &TcpStream, answer: &HttpResponse, more: bool) -> Result<()> {
     Until::after(PATIENCE, stream).write_all(&answer.bytes(more))
 }
 
-impl Answer<'_> {
+impl HttpResponse<'_> {
     /// The answer as it is sent; `more` requests may follow on the connection.
     fn bytes(&self, more: bool) -> Vec<u8> {
-        let Answer { status, headers, kind, body } = self;
+        let HttpResponse { status, headers, kind, body } = self;
         let connection = if more { "keep-alive" } else { "close" };
         let mut bytes = format!("HTTP/1.1 {status}\r\n{HEADERS}{headers}Connection: {connection}\r\n").into_bytes();
         // An answer without content has no length either.
@@ -223,7 +223,7 @@ impl Answer<'_> {
 
 /// Answers and ends the connection. What the client still sends is read for a while: a connection that is closed with
 /// bytes unread is reset, and the client may lose the answer.
-fn last_answer(stream: &TcpStream, last: &Answer) -> Result<()> {
+fn last_answer(stream: &TcpStream, last: &HttpResponse) -> Result<()> {
     answer(stream, last, false)?;
     stream.shutdown(Shutdown::Write)?;
     let mut rest = Until::after(WAIT, stream);

@@ -83,7 +83,7 @@ fn scenes_and_options_take_the_file() {
 
 #[test]
 fn what_the_files_lack_is_told_before_synthesis() {
-    let told = |file: &str, from: &str, to: &str| {
+    let message = |file: &str, from: &str, to: &str| {
         let folder = example();
         let path = folder.path().join(file);
         let text = fs::read_to_string(&path).unwrap();
@@ -110,8 +110,8 @@ fn what_the_files_lack_is_told_before_synthesis() {
         ("my-board.toml", "24.0", "0", "my-board.toml, line 5: clock_MHz = 0 is not allowed; it must be a number above 0"),
     ];
     for (file, from, to, wanted) in cases {
-        let told = told(file, from, to);
-        assert!(told.contains(&format!("error: ./{wanted}")), "{told}\n{wanted}");
+        let message = message(file, from, to);
+        assert!(message.contains(&format!("error: ./{wanted}")), "{message}\n{wanted}");
     }
 }
 

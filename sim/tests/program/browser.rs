@@ -124,9 +124,9 @@ impl Drop for Browser {
     fn drop(&mut self) {
         // Ends its child processes too; killed if it does not answer.
         let close = json!({"id": 0, "method": "Browser.close"});
-        let told = self.commands.write_all(format!("{close}\0").as_bytes());
+        let sent = self.commands.write_all(format!("{close}\0").as_bytes());
         let begun = Instant::now();
-        while told.is_ok() && matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < PATIENCE {
+        while sent.is_ok() && matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < PATIENCE {
             std::thread::sleep(Duration::from_millis(20));
         }
         let _ = self.child.kill();

@@ -21,7 +21,7 @@ fn guide(root: &Path, args: &[&str]) -> Output {
 }
 
 /// What it printed, and its exit code.
-fn told(output: &Output) -> (String, Option<i32>) {
+fn outcome(output: &Output) -> (String, Option<i32>) {
     let all = [&output.stdout[..], &output.stderr[..]].concat();
     (String::from_utf8_lossy(&all).into_owned(), output.status.code())
 }
@@ -39,7 +39,7 @@ fn copied() -> tempfile::TempDir {
 
 #[test]
 fn the_tables_of_the_pages_are_what_their_commands_print() {
-    let (text, code) = told(&guide(&root(), &["--check", "--quick"]));
+    let (text, code) = outcome(&guide(&root(), &["--check", "--quick"]));
     assert_eq!(code, Some(0), "{text}");
 }
 
@@ -60,7 +60,7 @@ fn a_changed_digit_is_found_and_mended() {
     let mut changed = table.to_owned();
     changed.replace_range(digit..=digit, other);
     fs::write(&path, format!("{before}{changed}{after}")).unwrap();
-    let check = || told(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
+    let check = || outcome(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
     let (text, code) = check();
     assert_eq!(code, Some(1), "{text}");
     let line = before.lines().count();
@@ -69,7 +69,7 @@ fn a_changed_digit_is_found_and_mended() {
     assert!(text.contains(&format!("page:    {}", row(&changed))), "{text}");
     assert!(text.contains(&format!("command: {}", row(table))), "{text}");
     // Written anew the table is as it was.
-    let (text, code) = told(&guide(folder.path(), &["--only", COMMAND]));
+    let (text, code) = outcome(&guide(folder.path(), &["--only", COMMAND]));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
     assert_eq!(check().1, Some(0));
@@ -86,13 +86,13 @@ fn a_stale_figure_in_the_text_is_found_and_mended() {
     let from = at + whole[at..].find("-->").unwrap() + "-->".len();
     let to = from + whole[from..].find(END).unwrap();
     fs::write(&path, format!("{}1 267{}", &whole[..from], &whole[to..])).unwrap();
-    let check = || told(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
+    let check = || outcome(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
     let (text, code) = check();
     assert_eq!(code, Some(1), "{text}");
     let line = whole[..at].lines().count();
     let wanted = format!("README.md:{line}: stale: {COMMAND}\n  page:    1 267\n  command: {}\n", &whole[from..to]);
     assert!(text.contains(&wanted), "{text}");
-    assert_eq!(told(&guide(folder.path(), &["--only", COMMAND])).1, Some(0));
+    assert_eq!(outcome(&guide(folder.path(), &["--only", COMMAND])).1, Some(0));
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
     assert_eq!(check().1, Some(0));
 }
@@ -103,7 +103,7 @@ fn a_command_that_fails_and_a_marker_without_end_are_errors() {
     fs::create_dir_all(folder.path().join(GUIDE)).unwrap();
     let page = |text: &str| {
         fs::write(folder.path().join("README.md"), text).unwrap();
-        told(&guide(folder.path(), &[]))
+        outcome(&guide(folder.path(), &[]))
     };
     let (text, code) = page("a\n<!-- table: dermis study link-times no-such-scene -->\n<!-- end of table -->\n");
     assert_eq!(code, Some(2), "{text}");
@@ -114,21 +114,21 @@ fn a_command_that_fails_and_a_marker_without_end_are_errors() {
     let (text, code) = page("<!-- table: dermis study link-times -->\n");
     assert_eq!(code, Some(2));
     assert!(text.contains("README.md:1: no `<!-- end of table -->`"), "{text}");
-    assert_eq!(told(&guide(folder.path(), &["--only", "nothing"])).1, Some(2));
-    let (text, code) = told(&guide(&folder.path().join(GUIDE), &[]));
+    assert_eq!(outcome(&guide(folder.path(), &["--only", "nothing"])).1, Some(2));
+    let (text, code) = outcome(&guide(&folder.path().join(GUIDE), &[]));
     assert_eq!((code, text.contains("no README.md")), (Some(2), true), "{text}");
 }
 
 #[test]
 fn the_pictures_that_only_the_program_changes_are_drawn_anew() {
-    let (text, code) = told(&guide(&root(), &["--check", "--pictures"]));
+    let (text, code) = outcome(&guide(&root(), &["--check", "--pictures"]));
     assert_eq!(code, Some(0), "{text}");
     // And one that is not is told.
     let folder = tempfile::tempdir().unwrap();
     let pictures = folder.path().join(GUIDE).join("pictures");
     fs::create_dir_all(&pictures).unwrap();
     fs::write(pictures.join("feet.svg"), "<svg/>").unwrap();
-    let (text, code) = told(&guide(folder.path(), &["--check", "--pictures"]));
+    let (text, code) = outcome(&guide(folder.path(), &["--check", "--pictures"]));
     assert_eq!(code, Some(1));
     assert!(text.contains("feet.svg: stale"), "{text}");
 }

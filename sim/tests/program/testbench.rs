@@ -70,15 +70,15 @@ fn two_cores_share_a_folder_and_the_memory_file_of_another_is_found() {
     let (own, other) = (rtl.join("dermis_small__coefficients.hex"), rtl.join("dermis_thick__coefficients.hex"));
     let right = fs::read_to_string(&own).unwrap();
     assert_eq!(right.len(), fs::read_to_string(&other).unwrap().len());
-    let is_told = || {
+    let is_reported = || {
         let (text, passed) = run(&rtl, "small");
-        let told = text.contains("dermis_small__coefficients.hex: missing, or not the file of this core");
-        assert!(told && !passed && !text.contains("PASS"), "{text}");
+        let reported = text.contains("dermis_small__coefficients.hex: missing, or not the file of this core");
+        assert!(reported && !passed && !text.contains("PASS"), "{text}");
     };
     fs::copy(&other, &own).unwrap();
-    is_told();
+    is_reported();
     fs::remove_file(&own).unwrap();
-    is_told();
+    is_reported();
     fs::write(&own, right).unwrap();
     assert!(passes("small"));
     // One name for both cores: one of them gets the coefficients of the other.

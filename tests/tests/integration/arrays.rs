@@ -219,9 +219,9 @@ fn a_defect_is_found() {
         Change::value(calibrate, "place", |k| k.named("taxel").extend(6)),
         Change::value(average, "place", |k| k.named("taxel").extend(6)),
         Change::value("prepare__frame_array", "begins", |k| k.constant(1, 1)),
-        Change::value("", "sent_arrays__word", |k| k.named("frame_array__kept")),
-        Change::value("", "received_floor__keep", |k| k.constant(1, 0)),
-        Change::value("", "sent_array__keep", |k| k.constant(1, 0)),
+        Change::value("", "sent_arrays__word", |k| k.named("frame_array__held")),
+        Change::value("", "received_floor__enable", |k| k.constant(1, 0)),
+        Change::value("", "sent_array__enable", |k| k.constant(1, 0)),
     ];
     for defect in variants(&defects, 2) {
         hardware.generated = generate_changed(&hardware.model, std::slice::from_ref(defect)).unwrap();

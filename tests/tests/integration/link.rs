@@ -14,7 +14,7 @@ use dermis_golden::wire::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
-use dermis_host::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
+use dermis_host::link::{BoardAnswer, HostUart, PhysicalAnswer, UartSymbol};
 use dermis_tests::{build_dir, scene, variants, with_network};
 
 mod scan;
@@ -333,7 +333,7 @@ fn records_of_contacts_are_the_resultants() {
     let mut answers = board.receive();
     assert!(answers == [board.answer(0, Kind::FrameForResultants, 5, false)]);
     assert_eq!(board.counters(), Counters { taken: 3, unknown_type: 1, ..Counters::default() });
-    let answer = Answer::of_bytes(&board.model, &answers.remove(0).payload, false).unwrap();
+    let answer = BoardAnswer::of_bytes(&board.model, &answers.remove(0).payload, false).unwrap();
     assert_eq!(answer.compare_with_model(&board.model, &board.codes[0]), None);
     let physical = PhysicalAnswer::new(&board.model, &frame, &answer).unwrap();
     let of_model = board.model.reconstruct(&frame).unwrap();
@@ -356,7 +356,7 @@ fn contacts_are_answered_with_their_labels() {
         assert!(answers == [wanted], "frame {index}, {kind:?}");
         payload = answers.remove(0).payload;
     }
-    let answer = Answer::of_bytes(&board.model, &payload, true).unwrap();
+    let answer = BoardAnswer::of_bytes(&board.model, &payload, true).unwrap();
     assert_eq!(answer.compare_with_model(&board.model, &board.codes[0]), None);
     let contacts = PhysicalAnswer::new(&board.model, &frame, &answer).unwrap().contacts.unwrap();
     let of_model = board.model.reconstruct(&frame).unwrap().contacts().unwrap();

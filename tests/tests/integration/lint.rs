@@ -119,8 +119,8 @@ fn cores_are_clean_with_the_engines_waivers() {
     let mut averaged = scene("eight-by-eight").0;
     averaged.input.average = 1;
     let shape = CoreShape { bus: Bus::AxiLite, words: 1 };
-    let told = generate_core(&Model::new(&averaged).unwrap(), shape).unwrap_err().to_string();
-    assert_eq!(told, "input.average = 1: a core with several frames per result is not available yet");
+    let message = generate_core(&Model::new(&averaged).unwrap(), shape).unwrap_err().to_string();
+    assert_eq!(message, "input.average = 1: a core with several frames per result is not available yet");
 }
 
 #[test]

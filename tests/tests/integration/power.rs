@@ -66,9 +66,9 @@ fn the_estimate_adds_up() {
 fn a_board_without_a_device_has_no_estimate() {
     let mut board = hardware().model.board.clone();
     board.device = None;
-    let told = energies(&board).unwrap_err().to_string();
+    let message = energies(&board).unwrap_err().to_string();
     assert_eq!(
-        told,
+        message,
         "constraints/ulx3s-85f.toml: no device: no energies of its resources are known, which an estimate of power needs"
     );
 }

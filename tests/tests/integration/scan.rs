@@ -157,7 +157,7 @@ fn seeded_defects_are_found() {
 #[test]
 fn a_stream_has_nothing_of_a_scan() {
     let (scene, _) = scene("eight-by-eight");
-    assert!(["capture", "told"].iter().all(|block| !verilog_code(&scene).contains(&format!("__{block} ("))));
+    assert!(["capture", "scan_status"].iter().all(|block| !verilog_code(&scene).contains(&format!("__{block} ("))));
     let error = generate_scan(&Model::new(&scene).unwrap()).unwrap_err().to_string();
     assert_eq!(error, "hardware.source = stream: a scan is not available yet");
     let (scene, _) = scanned(1, 0);
@@ -170,5 +170,5 @@ fn a_stream_has_nothing_of_a_scan() {
     let error = generate_core(&model, CoreShape { bus: Bus::AxiLite, words: 1 }).unwrap_err().to_string();
     assert_eq!(error, "hardware.source = adc-scan: a core for a SoC around a scan is not available yet");
     let text = &generate_scan(&model).unwrap().files[0].text;
-    assert!(["sequencer", "capture", "told"].iter().all(|block| text.contains(&format!("__{block} ("))));
+    assert!(["sequencer", "capture", "scan_status"].iter().all(|block| text.contains(&format!("__{block} ("))));
 }

@@ -102,15 +102,15 @@ fn no_file_has_a_phrase_of_the_list() {
     let phrases = phrases(&fs::read_to_string(root.join(LIST)).unwrap());
     let files = files(&root);
     assert!(files.len() > 400, "{} files", files.len());
-    let mut told = String::new();
+    let mut found_phrases = String::new();
     for path in files {
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let name = path.strip_prefix(&root).unwrap().display();
         for (line, phrase) in found(&text, &phrases) {
-            told.push_str(&format!("{name}:{line}: {:?}; write: {}\n", phrase.words, phrase.instead));
+            found_phrases.push_str(&format!("{name}:{line}: {:?}; write: {}\n", phrase.words, phrase.instead));
         }
     }
-    assert!(told.is_empty(), "phrases of {LIST}:\n{told}");
+    assert!(found_phrases.is_empty(), "phrases of {LIST}:\n{found_phrases}");
 }
 
 #[test]

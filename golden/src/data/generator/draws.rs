@@ -3,8 +3,7 @@
 //! | drawn | range |
 //! |---|---|
 //! | shape of contact k of frame n | `shapes` in turn, from the (n + k)th |
-//! | first half-axis | s to 2 s, s = h, but the larger pitch where it exceeds 2 h: taxels miss smaller ones |
-//! | second half-axis, angle, place | as [`super::random_contacts`]: ratio 0.7 to 1.35, rim s/2 inside, 2 h apart |
+//! | half-axes, angle, place | as [`super::random_contacts`] |
 //! | inner over outer radius of a ring | 0.3 … 0.7 |
 //! | tilt | 0.3 … 0.8, any direction |
 //! | normal load | `normal_N`, 1 … 12 N |
@@ -37,14 +36,12 @@ use std::f64::consts::TAU;
 const TRIES: usize = 20;
 /// Largest number of contacts of a frame.
 const MOST_CONTACTS: usize = 64;
-/// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
-const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
 pub(super) const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Shape of a drawn contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum ContactShape {
     /// Hertz's pressure on an ellipse.
     Hertz,
     /// Uniform pressure on an ellipse.
@@ -59,23 +56,24 @@ pub enum Shape {
     Asymmetric,
 }
 
-impl Shape {
+impl ContactShape {
     /// Every shape with its name in options and tables.
-    pub const NAMES: [(&'static str, Shape); 6] = [
-        ("hertz", Shape::Hertz),
-        ("punch", Shape::Punch),
-        ("ring", Shape::Ring),
-        ("rectangle", Shape::Rectangle),
-        ("tilted", Shape::Tilted),
-        ("asymmetric", Shape::Asymmetric),
+    pub const NAMES: [(&'static str, ContactShape); 6] = [
+        ("hertz", ContactShape::Hertz),
+        ("punch", ContactShape::Punch),
+        ("ring", ContactShape::Ring),
+        ("rectangle", ContactShape::Rectangle),
+        ("tilted", ContactShape::Tilted),
+        ("asymmetric", ContactShape::Asymmetric),
     ];
 
     /// The five shapes of the published tables, in equal shares: all but `asymmetric`.
-    pub const TABLE: [Shape; 5] = [Shape::Hertz, Shape::Punch, Shape::Ring, Shape::Rectangle, Shape::Tilted];
+    pub const TABLE: [ContactShape; 5] =
+        [ContactShape::Hertz, ContactShape::Punch, ContactShape::Ring, ContactShape::Rectangle, ContactShape::Tilted];
 
     /// The name in options and tables.
     pub fn name(self) -> &'static str {
-        Shape::NAMES.iter().find(|(_, shape)| *shape == self).map_or("", |(name, _)| *name)
+        ContactShape::NAMES.iter().find(|(_, shape)| *shape == self).map_or("", |(name, _)| *name)
     }
 
     /// Shape and sizes of a contact with the given half-axes, as [`crate::data::generator`] takes them.
@@ -83,16 +81,16 @@ impl Shape {
         let angle = random.between(0.0, 180.0);
         let long = a.max(b);
         match self {
-            Shape::Hertz => ("hertz-ellipse", vec![a, b, angle]),
-            Shape::Punch => ("flat-punch", vec![a, b, angle]),
-            Shape::Ring => ("ring", vec![long, random.between(0.3, 0.7) * long]),
+            ContactShape::Hertz => ("hertz-ellipse", vec![a, b, angle]),
+            ContactShape::Punch => ("flat-punch", vec![a, b, angle]),
+            ContactShape::Ring => ("ring", vec![long, random.between(0.3, 0.7) * long]),
             // The corners reach as far as the ellipse.
-            Shape::Rectangle => ("rectangle", vec![1.41 * a, 1.41 * b, angle]),
-            Shape::Tilted => {
+            ContactShape::Rectangle => ("rectangle", vec![1.41 * a, 1.41 * b, angle]),
+            ContactShape::Tilted => {
                 let (tilt, towards) = (random.between(0.3, 0.8), random.between(0.0, TAU));
                 ("tilted", vec![a, b, angle, tilt * towards.cos(), tilt * towards.sin()])
             }
-            Shape::Asymmetric => ("lobed", vec![a, b, angle]),
+            ContactShape::Asymmetric => ("lobed", vec![a, b, angle]),
         }
     }
 }
@@ -101,7 +99,7 @@ impl Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawOptions {
     /// The shapes, taken in turn; not empty.
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<ContactShape>,
     /// Number of contacts of a frame, 1 to 64; they do not overlap.
     pub contacts: usize,
     /// Smallest and largest normal load of a contact in N.
@@ -121,7 +119,7 @@ pub struct DrawOptions {
 impl Default for DrawOptions {
     fn default() -> Self {
         DrawOptions {
-            shapes: Shape::TABLE.to_vec(),
+            shapes: ContactShape::TABLE.to_vec(),
             contacts: 1,
             normal_N: [1.0, 12.0],
             ratio: [0.15, 0.5],
@@ -137,7 +135,7 @@ impl Default for DrawOptions {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactTruth {
     /// Its shape.
-    pub shape: Shape,
+    pub shape: ContactShape,
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],
     /// Force in N, [x, y, normal].
@@ -243,11 +241,8 @@ impl Draws {
                 ..Default::default()
             }
         };
-        let Sensor { pitch_x_mm, pitch_y_mm, thickness_mm, .. } = self.sensor;
-        let pitch_mm = pitch_x_mm.max(pitch_y_mm);
-        let size_mm = if pitch_mm > COARSE * thickness_mm { pitch_mm } else { thickness_mm };
         for _ in 0..TRIES {
-            if let (contacts, true) = placed(&self.sensor, size_mm, &mut random, count, false, shaped) {
+            if let (contacts, true) = placed(&self.sensor, &mut random, count, false, shaped) {
                 return Ok(contacts.into_iter().map(|contact| slip.of(contact, &mut of_slip)).collect());
             }
         }
@@ -255,7 +250,7 @@ impl Draws {
         Err(GeneratorError::Option { field: "contacts", value: count as f64, allowed })
     }
 
-    fn shape(&self, number: u64, index: usize) -> Shape {
+    fn shape(&self, number: u64, index: usize) -> ContactShape {
         let shapes = &self.options.shapes;
         shapes[((number % shapes.len() as u64) as usize + index) % shapes.len()]
     }
@@ -293,6 +288,7 @@ impl Draws {
 
 #[cfg(test)]
 mod tests {
+    use super::super::random::{random_contacts, Draw, Shapes};
     use super::*;
     use std::f64::consts::PI;
 
@@ -300,8 +296,8 @@ mod tests {
         Draws::new(&Scene::builtin(scene).unwrap(), options).unwrap()
     }
 
-    fn all() -> Vec<Shape> {
-        Shape::NAMES.map(|(_, shape)| shape).to_vec()
+    fn all() -> Vec<ContactShape> {
+        ContactShape::NAMES.map(|(_, shape)| shape).to_vec()
     }
 
     #[test]
@@ -348,7 +344,7 @@ mod tests {
         // Two independent ways: quadrature of the kernel of a point force, and cells of 0.2 mm.
         let sensor = Sensor { rows: 80, cols: 80, pitch_x_mm: 0.2, pitch_y_mm: 0.2, thickness_mm: 3.0 };
         let fine = Scene { sensor: sensor.clone(), ..Scene::builtin("sensor-1").unwrap() };
-        for shape in [Shape::Tilted, Shape::Asymmetric] {
+        for shape in [ContactShape::Tilted, ContactShape::Asymmetric] {
             let draws = Draws::new(&fine, DrawOptions { shapes: vec![shape], ..Default::default() }).unwrap();
             let contacts = draws.contacts(5).unwrap();
             let drawn_pieces = pieces(0, &contacts[0]).unwrap();
@@ -407,11 +403,14 @@ mod tests {
     #[test]
     fn contacts_are_seen_on_a_coarse_array() {
         let draws = draws("sensor-4", DrawOptions::default());
+        // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
+        let is_seen = |peak_MPa: f64, normal_N: f64| peak_MPa > normal_N / (PI * (2.7f64 * 8.0).powi(2));
         for number in 0..10 {
             let drawn = draws.frame(number).unwrap();
-            // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
-            let least = drawn.total_N[2] / (PI * (2.7f64 * 8.0).powi(2));
-            assert!(drawn.peak_MPa() > least, "{number}");
+            assert!(is_seen(drawn.peak_MPa(), drawn.total_N[2]), "{number}");
+            let draw = Draw { count: 1, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed: number };
+            let frame = generate("random", &draws.sensor, draws.medium, &random_contacts(&draws.sensor, draw)).unwrap();
+            assert!(is_seen(frame.peak_MPa(), frame.resultant_N.unwrap()[2]), "{number}");
         }
     }
 

@@ -2,12 +2,12 @@
 //!
 //! | drawn | range |
 //! |---|---|
-//! | first half-axis | h … 2 h, less on a small array |
+//! | first half-axis | s … 2 s, s = h, but the larger pitch where it exceeds 2 h: taxels miss smaller ones; less on a small array |
 //! | second half-axis | 0.7 … 1.35 of the first |
 //! | angle | 0 … 180° |
 //! | normal load | 1 … 12 N |
 //! | shear over load | 0.1 … 0.45, any direction |
-//! | position | the rim at least h/2 inside the array, if possible, and 2 h from other contacts |
+//! | position | the rim at least s/2 inside the array, if possible, and 2 h from other contacts |
 //!
 //! | spread of the shear | `slip`; `other` shapes in full slip: Hertz circles at 0.5 … 0.91 of the friction limit |
 //!
@@ -24,11 +24,13 @@ use std::f64::consts::TAU;
 
 /// Draws of a position; the required gap shrinks with each.
 const TRIES: usize = 200;
-/// Longest half-axis in units of the thickness: 2 · 1.35.
+/// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
+const COARSE: f64 = 2.0;
+/// Longest half-axis in units of s: 2 · 1.35.
 const LONGEST: f64 = 2.7;
 /// Gap between two rims in units of the thickness.
 const GAP: f64 = 2.0;
-/// Distance of a rim from the array's edge in units of the thickness.
+/// Distance of a rim from the array's edge in units of s.
 const INSIDE: f64 = 0.5;
 
 /// The shapes that are drawn.
@@ -77,17 +79,15 @@ impl Draw {
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
     let shaped = |random: &mut Random, _: usize, axes| shaped(random, draw.shapes, axes);
-    let (contacts, _) = placed(sensor, sensor.thickness_mm, &mut random, draw.count, draw.touching, shaped);
+    let (contacts, _) = placed(sensor, &mut random, draw.count, draw.touching, shaped);
     let mut of_slip = Random::new(!draw.seed);
     contacts.into_iter().map(|contact| draw.slip.of(contact, &mut of_slip)).collect()
 }
 
-/// Draws size and place of `count` contacts, the first half-axis from `size_mm` to twice that; `shaped` makes contact k of
-/// its half-axes. Also returns whether all places
-/// are within the array and apart from each other: there may be no room.
+/// Draws size and place of `count` contacts; `shaped` makes contact k of its half-axes. Also returns whether all places are within
+/// the array and apart from each other: there may be no room.
 pub(super) fn placed(
     sensor: &Sensor,
-    size_mm: f64,
     random: &mut Random,
     count: usize,
     touching: bool,
@@ -96,7 +96,8 @@ pub(super) fn placed(
     let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(count);
     let mut fits = true;
     let half = sensor.half_mm();
-    let h = sensor.thickness_mm;
+    let (h, pitch_mm) = (sensor.thickness_mm, sensor.pitch_x_mm.max(sensor.pitch_y_mm));
+    let size_mm = if pitch_mm > COARSE * h { pitch_mm } else { h };
     // On a small array the contacts are smaller.
     let unit = size_mm.min(half[0].min(half[1]) / (LONGEST + INSIDE));
     for index in 0..count {

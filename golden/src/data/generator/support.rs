@@ -109,14 +109,14 @@ impl Kernels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::generator::draws::{DrawOptions, Draws, Shape};
+    use crate::data::generator::draws::{ContactShape, DrawOptions, Draws};
     use crate::data::generator::slip::Slip;
     use crate::spec::scene::Scene;
 
     #[test]
     fn nodes_carry_the_load_and_cause_the_stress() {
         let scene = Scene::builtin("sensor-1").unwrap();
-        let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+        let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
         let kernels = Kernels::new(&scene.sensor, scene.medium);
         for slip in [Slip::Full, Slip::Partial(0.4), Slip::Even] {
             let draws = Draws::new(&scene, DrawOptions { shapes: shapes.clone(), slip, ..Default::default() }).unwrap();

@@ -64,12 +64,12 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
     };
     let header = separator.cells(header);
     let all = Columns::all(&header);
-    let names: Vec<String> = all.iter().map(|own| own.name.clone()).collect();
+    let names: Vec<String> = all.iter().map(|sensor| sensor.name.clone()).collect();
     if names.is_empty() {
         return Err(source.line(number, &header.join(","), "a header with columns C-S-NxN-Z[0], …"));
     }
-    let own = &all[wanted.choose(&names, source)?];
-    let shape = wanted.size(own.taxels.len(), "PaXini sensor", source)?;
+    let sensor = &all[wanted.choose(&names, source)?];
+    let shape = wanted.size(sensor.taxels.len(), "PaXini sensor", source)?;
     let (mut frames, mut left_out) = (Vec::new(), Vec::new());
     let (mut start_s, mut last_s, mut days) = (None, f64::NEG_INFINITY, 0.0);
     for (line, text) in lines.filter(|(_, text)| !text.trim().is_empty()) {
@@ -84,8 +84,8 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
         last_s = time_s;
         let start_s = *start_s.get_or_insert(time_s);
         let force = |&column: &usize| Ok(sensel(source, line, column + 1, &cells[column])? / STEPS_PER_N);
-        let values = own.taxels.iter().map(force).collect::<Result<Vec<f64>, ImportError>>()?;
-        let resultant = own.resultant.as_ref().map(force).transpose()?.filter(|force| force.is_finite());
+        let values = sensor.taxels.iter().map(force).collect::<Result<Vec<f64>, ImportError>>()?;
+        let resultant = sensor.resultant.as_ref().map(force).transpose()?.filter(|force| force.is_finite());
         frames.push(RawFrame {
             number: frames.len() + 1,
             // Milliseconds, which sums of days would spoil.
@@ -95,7 +95,7 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
             device: resultant.map(DeviceFigure::Force),
         });
     }
-    let (device, unit) = (Some(format!("PaXini, sensor {}", own.name)), Some(Unit::Newton));
+    let (device, unit) = (Some(format!("PaXini, sensor {}", sensor.name)), Some(Unit::Newton));
     Ok(Recording { device, unit, left_out, ..Recording::bare(Format::Paxini, shape, frames) })
 }
 

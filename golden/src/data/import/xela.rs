@@ -65,20 +65,21 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
             None => names[wanted.choose(&names, source)?].clone(),
         };
         let wrong = |reason: &str| source.line(line, text, format!("a message whose sensor {name} has {reason}"));
-        let Some(own) = message.get(&name) else {
+        let Some(sensor) = message.get(&name) else {
             left_out.push(format!("line {line}: without sensor {name}"));
             continue;
         };
-        let own: Sensor = serde_json::from_str(own.get()).map_err(|_| wrong("data, taxels, model and calibrated"))?;
+        let sensor: Sensor =
+            serde_json::from_str(sensor.get()).map_err(|_| wrong("data, taxels, model and calibrated"))?;
         let calibrated = match &first {
             Some(first) => first.calibrated,
             None => {
-                let shape = wanted.size(own.taxels, "XELA sensor", source)?;
-                let (model, calibrated) = (own.model.clone(), own.calibrated.is_some());
+                let shape = wanted.size(sensor.taxels, "XELA sensor", source)?;
+                let (model, calibrated) = (sensor.model.clone(), sensor.calibrated.is_some());
                 first.insert(First { name: name.clone(), model, shape, calibrated }).calibrated
             }
         };
-        let all = values(&own, calibrated).filter(|all| own.taxels.checked_mul(AXES) == Some(all.len()));
+        let all = values(&sensor, calibrated).filter(|all| sensor.taxels.checked_mul(AXES) == Some(all.len()));
         let all = all.ok_or_else(|| wrong("x, y and z of each taxel"))?;
         // As it is written: a floating-point number rounds the digits of a date.
         let time_ns = message.get("time").and_then(|time| number_ns(time.get(), 0));

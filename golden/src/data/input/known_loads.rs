@@ -193,13 +193,13 @@ impl LoadFit {
             whole.declare_dead(k, &all);
         }
         let Characteristic { table, live, .. } = &whole;
-        let residual = |own: &LeftOut| -> Option<Residual> {
-            let off: Vec<(usize, f64)> = own.off_MPa.iter().copied().filter(|(k, _)| live[*k]).collect();
+        let residual = |left_out: &LeftOut| -> Option<Residual> {
+            let off: Vec<(usize, f64)> = left_out.off_MPa.iter().copied().filter(|(k, _)| live[*k]).collect();
             let sum = |of: fn(f64) -> f64| off.iter().map(|(_, off)| of(*off)).sum::<f64>() / off.len() as f64;
             let (taxel, largest_MPa) = off.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
             Some(Residual {
-                stress_MPa: means[own.load].0,
-                frames: loads[own.load].frames.len(),
+                stress_MPa: means[left_out.load].0,
+                frames: loads[left_out.load].frames.len(),
                 mean_MPa: sum(|off| off),
                 rms_MPa: sum(|off| off * off).sqrt(),
                 largest_MPa,
@@ -245,7 +245,7 @@ impl LeftOut {
     fn new(means: &[Mean], load: usize, whole: &Characteristic, taxels: usize) -> Option<LeftOut> {
         let others: Vec<&Mean> = means.iter().enumerate().filter(|(k, _)| *k != load).map(|(_, mean)| mean).collect();
         let (stress_MPa, readings) = &means[load];
-        let within = others.iter().any(|own| own.0 < *stress_MPa) && others.iter().any(|own| own.0 > *stress_MPa);
+        let within = others.iter().any(|mean| mean.0 < *stress_MPa) && others.iter().any(|mean| mean.0 > *stress_MPa);
         let of_others = match whole.curvature.is_some() {
             true => within.then(|| Characteristic::curved(&others, taxels))??,
             false => (different(&others) >= 2).then(|| Characteristic::straight(&others, taxels))?,
@@ -410,12 +410,12 @@ mod tests {
                         let dead = fit.dead.contains(&[k / 8, k % 8]);
                         !dead && (sign * fit.table.gain[*k] / truth(*k).1 - 1.0).abs() > 0.03
                     };
-                    let told = !fit.saturated_MPa.is_empty()
+                    let reported = !fit.saturated_MPa.is_empty()
                         || fit.curved_share().is_some()
                         || fit.curvature.is_some()
                         || !fit.dead.is_empty();
                     match (0..64).find(wrong) {
-                        Some(k) if !told => silent.push((end, every, sign, k)),
+                        Some(k) if !reported => silent.push((end, every, sign, k)),
                         Some(_) => said += 1,
                         None => {}
                     }

@@ -68,7 +68,7 @@ pub struct Layout {
 }
 
 /// A line split at a separator.
-struct Row<'s> {
+struct SplitLine<'s> {
     line: Line<'s>,
     cells: Vec<Cow<'s, str>>,
     /// Whether it [has numbers](has_numbers).
@@ -78,7 +78,7 @@ struct Row<'s> {
 /// Lines split at one separator.
 struct Table<'s> {
     separator: Separator,
-    rows: Vec<Row<'s>>,
+    rows: Vec<SplitLine<'s>>,
     /// Cells of most lines that have numbers.
     cells: usize,
     /// The last cell of these is always empty.
@@ -199,9 +199,9 @@ impl<'s> Table<'s> {
     fn of(separator: Separator, lines: &[Line<'s>]) -> Option<Table<'s>> {
         let split = |line: &Line<'s>| {
             let cells = separator.cells(line.text);
-            Row { line: *line, numeric: has_numbers(&cells), cells }
+            SplitLine { line: *line, numeric: has_numbers(&cells), cells }
         };
-        let rows: Vec<Row> = lines.iter().take(LOOKED_AT).map(split).collect();
+        let rows: Vec<SplitLine> = lines.iter().take(LOOKED_AT).map(split).collect();
         let mut counts: Vec<usize> = rows.iter().filter(|row| row.numeric).map(|row| row.cells.len()).collect();
         counts.sort_unstable();
         let cells = counts.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len())?[0];
@@ -211,7 +211,7 @@ impl<'s> Table<'s> {
     }
 
     /// Whether a line has numbers, and as many cells as most that have.
-    fn is_like_most(&self, row: &Row) -> bool {
+    fn is_like_most(&self, row: &SplitLine) -> bool {
         row.numeric && row.cells.len() == self.cells
     }
 
@@ -294,16 +294,16 @@ impl<'s> Table<'s> {
                 "{got} values, wanted {wanted}; a decimal mark is a point where commas separate values"
             ));
         }
-        let own = got - usize::from(self.trailing);
+        let count = got - usize::from(self.trailing);
         match stated.form {
-            Some(form) if own >= of(form).1 || got == of(form).1 => Ok(of(form)),
-            None if got == taxels || own >= taxels => Ok(of(Form::Line)),
-            None if got == cols || own == cols => Ok(of(Form::Grid)),
-            Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
+            Some(form) if count >= of(form).1 || got == of(form).1 => Ok(of(form)),
+            None if got == taxels || count >= taxels => Ok(of(Form::Line)),
+            None if got == cols || count == cols => Ok(of(Form::Grid)),
+            Some(form) => Err(format!("{count} values, wanted {}", of(form).1)),
             None => {
-                let numbered = own > cols && self.numbers_rows(rows);
+                let numbered = count > cols && self.numbers_rows(rows);
                 let hint = if numbered { "; --columns A..B says which are the readings of a row" } else { "" };
-                Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
+                Err(format!("{count} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
             }
         }
     }

@@ -386,14 +386,14 @@ impl Reader {
             return None;
         }
         let lines: Vec<Line> = self.other.iter().map(|(number, text)| Line { number: *number, text }).collect();
-        let own = Layout::of_lines(&lines, self.shape, &self.stated).ok().filter(|own| {
-            let fits = |line: &Line| own.readings_of(line, &own.split(line.text)).is_ok();
-            !own.is_like(layout) && lines.iter().all(fits)
+        let new = Layout::of_lines(&lines, self.shape, &self.stated).ok().filter(|new| {
+            let fits = |line: &Line| new.readings_of(line, &new.split(line.text)).is_ok();
+            !new.is_like(layout) && lines.iter().all(fits)
         });
-        match own {
-            Some(own) => {
+        match new {
+            Some(new) => {
                 (self.begin, self.names) = (std::mem::take(&mut self.other), None);
-                Some(own)
+                Some(new)
             }
             None => {
                 self.other.remove(0);

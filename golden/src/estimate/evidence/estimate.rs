@@ -6,7 +6,7 @@ use crate::spec::sensor::Sensor;
 
 /// What one frame says.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Estimate {
+pub struct EvidenceEstimate {
     /// The contacts; none without a reading above zero.
     pub contacts: Vec<ContactEstimate>,
     /// Force on each taxel in N.
@@ -35,7 +35,7 @@ pub struct Estimate {
     pub residual_correlation: Option<f64>,
 }
 
-impl Estimate {
+impl EvidenceEstimate {
     /// Makes it that of readings `unit` times as large.
     pub(super) fn scale(&mut self, unit: f64) {
         let Forces { fx, fy, fz } = &mut self.forces_N;

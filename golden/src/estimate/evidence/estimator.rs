@@ -3,7 +3,7 @@
 use super::ascent::Prior;
 use super::cells::Cells;
 use super::envelope::Envelopes;
-use super::prior::Shape;
+use super::prior::ShapeCorrelation;
 use super::screen::Screen;
 use super::slip::SpreadPrior;
 use crate::estimate::learned::Learned;
@@ -23,13 +23,13 @@ const WINDOW: f64 = 4.0;
 /// pair of taxels. Drawn presses take 1000 to 2500 in the median; without a limit noise and even loads take up to 26 times as much.
 const WORK: u64 = 3000;
 /// The same of fits whose μ a network gives, over that: each has further rounds with all coefficients.
-const ADVISED: u64 = 2;
+const WITH_NETWORK: u64 = 2;
 
 /// The estimator of one scene.
 pub struct Evidence {
     pub(in crate::estimate) cells: Cells,
     pub(in crate::estimate) envelopes: Envelopes,
-    pub(in crate::estimate) shape: Shape,
+    pub(in crate::estimate) shape: ShapeCorrelation,
     pub(super) segmenter: Segmenter,
     pub(super) prior: Prior,
     pub(super) spreads: SpreadPrior,
@@ -39,14 +39,14 @@ pub struct Evidence {
     pub(super) gain_spread: f64,
     /// Noise of each taxel over the root mean square of all.
     pub(super) noise_shares: Vec<f64>,
-    pub(super) adviser: Option<Adviser>,
+    pub(super) mu_network: Option<MuNetwork>,
     pub(super) screen: Option<Screen>,
     /// See [`WORK`]; for the whole array.
     pub(super) work: u64,
 }
 
-/// A network, and whether the evidence has a say.
-pub(super) struct Adviser {
+/// A network that gives μ, and whether alone.
+pub(super) struct MuNetwork {
     /// The network.
     pub network: Learned,
     /// Whether its μ is combined with the evidence's.
@@ -65,7 +65,7 @@ impl Evidence {
         let cells = Cells::new(sensor, scene.medium, length_mm);
         Evidence {
             envelopes: Envelopes::new(&cells, length_mm),
-            shape: Shape::new(&cells.grid, length_mm),
+            shape: ShapeCorrelation::new(&cells.grid, length_mm),
             segmenter: Segmenter::new(&cells.grid, WIDTH),
             cells,
             prior: Prior { mu_max: scene.search.mu_max },
@@ -76,7 +76,7 @@ impl Evidence {
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,
             noise_shares: vec![1.0; sensor.taxels()],
-            adviser: None,
+            mu_network: None,
         }
     }
 
@@ -97,8 +97,8 @@ impl Evidence {
     }
 
     /// The same with the μ of each contact from a trained network; `combined` with the evidence's own or in its place.
-    pub fn advised_by(self, network: Learned, combined: bool) -> Evidence {
-        Evidence { adviser: Some(Adviser { network, combined }), work: ADVISED * self.work, ..self }
+    pub fn with_network(self, network: Learned, combined: bool) -> Evidence {
+        Evidence { mu_network: Some(MuNetwork { network, combined }), work: WITH_NETWORK * self.work, ..self }
     }
 
     /// The taxels that are read: all of a small array, those near the pressure `p` (N per cell) of a large one.

@@ -9,7 +9,7 @@
 //! | in: stress | taxels | MPa |
 //! | out: forces, one contact | 3 × taxels | N |
 
-use super::estimate::Estimate;
+use super::estimate::EvidenceEstimate;
 use super::estimator::Evidence;
 use crate::data::frame::Forces;
 use crate::result::reconstruct::ContactEstimate;
@@ -18,7 +18,7 @@ use crate::result::reconstruct::ContactEstimate;
 const UNKNOWN: f64 = 0.5;
 
 /// The estimate without a fit; `stated_MPa` is the noise, if it is known.
-pub(super) fn estimate(scene: &Evidence, b: &[f64], stated_MPa: Option<f64>) -> Estimate {
+pub(super) fn estimate(scene: &Evidence, b: &[f64], stated_MPa: Option<f64>) -> EvidenceEstimate {
     let sensor = &scene.cells.sensor;
     let read: Vec<f64> = b.iter().zip(&scene.alive).map(|(b, alive)| if *alive { *b } else { 0.0 }).collect();
     let sum = |of: fn(f64) -> f64| sensor.sum_of_stress_N(&read.iter().map(|b| of(*b)).collect::<Vec<_>>());
@@ -41,5 +41,5 @@ pub(super) fn estimate(scene: &Evidence, b: &[f64], stated_MPa: Option<f64>) -> 
         mu_covariance: [mu * mu, 0.0, mu * mu],
     };
     let noise_MPa = stated_MPa.unwrap_or(0.0);
-    Estimate { contacts: vec![contact], forces_N, noise_MPa, failed: true, ..Estimate::default() }
+    EvidenceEstimate { contacts: vec![contact], forces_N, noise_MPa, failed: true, ..EvidenceEstimate::default() }
 }

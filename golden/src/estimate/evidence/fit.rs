@@ -6,15 +6,15 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b | taxels | of its peak |
-//! | out: [`Estimate`] | – | N per MPa of the peak |
+//! | out: [`EvidenceEstimate`] | – | N per MPa of the peak |
 
-mod advice;
+mod network;
 mod outcome;
 mod regions;
 
 use super::ascent::{ascend, Top};
 use super::baseline::{plane, Sizes};
-use super::estimate::Estimate;
+use super::estimate::EvidenceEstimate;
 use super::estimator::Evidence;
 use super::model::{Design, Readings};
 use super::regions::Regions;
@@ -98,7 +98,7 @@ pub(super) struct Fit<'a> {
 /// What a fit says of one frame.
 pub(super) struct Fitted {
     /// Contacts and forces.
-    pub estimate: Estimate,
+    pub estimate: EvidenceEstimate,
     /// The reading that the others explain least: taxel, and its distance in standard deviations.
     pub worst: Option<(usize, f64)>,
     /// What the others say of each taxel that is not used.
@@ -232,8 +232,8 @@ impl<'a> Fit<'a> {
             false => Mat::zeros(unknowns, unknowns),
         };
         let mut found = Found { regions, top, covariance };
-        if let Some(adviser) = self.scene.adviser.as_ref().filter(|_| !found.regions.wide) {
-            found = self.advised(adviser, found)?;
+        if let Some(mu_network) = self.scene.mu_network.as_ref().filter(|_| !found.regions.wide) {
+            found = self.with_network(mu_network, found)?;
         }
         self.estimate(&found)
     }

@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::data::frame::Frame;
     use crate::data::generator::presses::{Motion, Press};
-    use crate::estimate::evidence::{suspect, Estimate};
+    use crate::estimate::evidence::{suspect, EvidenceEstimate};
     use crate::spec::scene::Scene;
 
     const MOMENTS: usize = 12;
@@ -122,7 +122,7 @@ mod tests {
         press.read(part, number).unwrap()
     }
 
-    fn sigma(estimate: &Estimate, axis: usize) -> f64 {
+    fn sigma(estimate: &EvidenceEstimate, axis: usize) -> f64 {
         estimate.contacts.iter().map(|own| own.sigma_N[axis].powi(2)).sum::<f64>().sqrt()
     }
 

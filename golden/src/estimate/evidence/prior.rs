@@ -34,16 +34,16 @@ pub(in crate::estimate) fn remainder(sigma: f64) -> f64 {
 }
 
 /// The correlation k of the shape: for each number of cells along x and along y the factor of it.
-pub(in crate::estimate) struct Shape([Vec<f64>; 2]);
+pub(in crate::estimate) struct ShapeCorrelation([Vec<f64>; 2]);
 
-impl Shape {
+impl ShapeCorrelation {
     /// The shape on the cells of `grid`, smooth over `length_mm`.
-    pub fn new(grid: &Sensor, length_mm: f64) -> Shape {
+    pub fn new(grid: &Sensor, length_mm: f64) -> ShapeCorrelation {
         let along = |count: usize, pitch_mm: f64| {
             let at = |away: usize| (-0.5 * (away as f64 * pitch_mm / length_mm).powi(2)).exp();
             (0..count).map(at).collect()
         };
-        Shape([along(grid.cols, grid.pitch_x_mm), along(grid.rows, grid.pitch_y_mm)])
+        ShapeCorrelation([along(grid.cols, grid.pitch_x_mm), along(grid.rows, grid.pitch_y_mm)])
     }
 
     /// The factor F for cells `active` with envelope `envelope` in N that leaves out at most `remainder` but has at most
@@ -91,7 +91,7 @@ mod tests {
         let active: Vec<usize> = (200..260).collect();
         let envelope: Vec<f64> = (0..60).map(|k| 0.1 + f64::from(k % 7)).collect();
         let least = remainder(0.0);
-        let shape = Shape::new(&cells.grid, 2.0);
+        let shape = ShapeCorrelation::new(&cells.grid, 2.0);
         let of = |remainder: f64, most: usize| shape.factor(&active, &envelope, remainder, most);
         let (f, rest) = of(least, 60);
         assert!(rest <= least && of(least, 9).1 > least);

@@ -192,7 +192,7 @@ impl Fitted {
 mod tests {
     use super::*;
     use crate::data::generator::draws::{DrawOptions, Draws};
-    use crate::estimate::evidence::Estimate;
+    use crate::estimate::evidence::EvidenceEstimate;
     use crate::random::Random;
     use crate::result::checks::{CORRELATED, LOUD, OUTLIER};
     use crate::result::errors::Errors;
@@ -208,7 +208,7 @@ mod tests {
     }
 
     /// Whether the estimate says that something is wrong with the readings; `peak` is their largest.
-    fn says_so(estimate: &Estimate, peak: f64) -> bool {
+    fn says_so(estimate: &EvidenceEstimate, peak: f64) -> bool {
         let suspect = estimate.failed || !estimate.suspects.is_empty() || estimate.noise_MPa > LOUD * peak;
         suspect
             || estimate.outlier.is_some_and(|size| size > OUTLIER)

@@ -26,13 +26,13 @@
 
 use super::array::{Array, BySearch, CaseOutcome, EngineInput};
 use super::by_contacts::taxels;
-use super::contacts::Contacts;
+use super::contacts::SolvedContacts;
 use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::objective::taxels::Taxels;
 use super::objective::Sparse;
 use crate::data::frame::Forces;
-use crate::data::reception::Received;
+use crate::data::reception::SubarrayStats;
 use crate::estimate::segment::{segment, Segments, WIDTH};
 use crate::result::reconstruct::{CaseChoice, Reconstruction, RejectedCase};
 use crate::spec::partition::{Case, Subarray};
@@ -70,7 +70,12 @@ fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
 }
 
 /// The reason for rejecting a case; `None` if it is admissible.
-fn rejection_reason(sensor: &Sensor, parts: &[Subarray], received: &[Received], contacts: &[Extent]) -> Option<String> {
+fn rejection_reason(
+    sensor: &Sensor,
+    parts: &[Subarray],
+    received: &[SubarrayStats],
+    contacts: &[Extent],
+) -> Option<String> {
     if let [_] = parts {
         return None;
     }
@@ -132,7 +137,7 @@ impl Estimator for Adaptive {
         let (array, sensor) = (&self.array, &input.scene.sensor);
         let whole = array.subarrays(input, array.whole(), &BySearch(&Sparse::default()));
         let solved = array.find_contacts(self.taxels.as_ref(), input);
-        let target = solved.as_ref().map(Contacts::forces);
+        let target = solved.as_ref().map(SolvedContacts::forces);
         let contacts = match &solved {
             Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
             _ => extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH)),
@@ -142,7 +147,7 @@ impl Estimator for Adaptive {
         let mut refused: Vec<(Case, String)> = Vec::new();
         let mut best = (off(&whole), Case::WHOLE, whole, nothing);
         for tiling in array.tilings.iter().rev().filter(|tiling| tiling.case != Case::WHOLE) {
-            let received: Vec<Received> = tiling.parts.iter().map(|part| input.receive(part)).collect();
+            let received: Vec<SubarrayStats> = tiling.parts.iter().map(|part| input.receive(part)).collect();
             if let Some(reason) = rejection_reason(sensor, &tiling.parts, &received, &contacts) {
                 refused.push((tiling.case, reason));
                 continue;
@@ -195,7 +200,7 @@ mod tests {
     fn against(case: i64, codes: &[i32], condition: Condition) -> Option<String> {
         let parts = subarrays(Case::numbered(case).unwrap(), &sensor()).unwrap();
         let received = |part: &Subarray| receive(&sensor(), part, &part.gather(&sensor(), codes), 0, condition);
-        let received: Vec<Received> = parts.iter().map(received).collect();
+        let received: Vec<SubarrayStats> = parts.iter().map(received).collect();
         rejection_reason(&sensor(), &parts, &received, &contact())
     }
 

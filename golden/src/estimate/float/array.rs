@@ -8,11 +8,11 @@
 
 use super::error::GoldenError;
 use super::forces::{force, threshold};
-use super::objective::{Estimate, Objective, SearchInput};
+use super::objective::{MuEstimate, Objective, SearchInput};
 use super::orthogonal::{truncation, Orthogonal};
 use super::pass::Polynomial;
 use crate::data::frame::{Forces, Frame};
-use crate::data::reception::{receive, Received};
+use crate::data::reception::{receive, SubarrayStats};
 use crate::physics::matrices::{Matrices, MatricesError};
 use crate::result::flags::Flag;
 use crate::result::reconstruct::{assemble, Reconstruction, SubarrayResult};
@@ -89,9 +89,9 @@ pub(super) struct CaseOutcome {
     pub flags: Vec<Flag>,
     /// Truncation error of each subarray, with the orthogonal form.
     pub truncation: Vec<f64>,
-    /// Largest misfit of a subarray's fitted shape, see [`Estimate::shape_misfit`].
+    /// Largest misfit of a subarray's fitted shape, see [`MuEstimate::shape_misfit`].
     pub shape_misfit: Option<f64>,
-    /// Largest relative standard deviation of a subarray's shear, see [`Estimate::shear_spread`].
+    /// Largest relative standard deviation of a subarray's shear, see [`MuEstimate::shear_spread`].
     pub shear_spread: Option<f64>,
 }
 
@@ -180,14 +180,14 @@ impl Array {
 /// Finds μ of a subarray.
 pub(super) trait Solve {
     /// The estimate for stress `b` in MPa, `None` if no μ is admissible, and p in N with its μ or with 0, before the threshold.
-    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<Estimate>, Vec<f64>);
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<MuEstimate>, Vec<f64>);
 }
 
 /// By the μ that maximises an objective.
 pub(super) struct BySearch<'a>(pub &'a dyn Objective);
 
 impl Solve for BySearch<'_> {
-    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<Estimate>, Vec<f64>) {
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<MuEstimate>, Vec<f64>) {
         let family = Polynomial::new(matrices, b);
         let estimate = self.0.find(&SearchInput { sensor: &matrices.sensor, b, family: &family, mu_max, noise_MPa });
         let p = estimate.map_or_else(|| family.eval([0.0; 2]), |estimate| estimate.pressure(&family));
@@ -207,7 +207,7 @@ impl EngineInput<'_> {
     }
 
     /// What `receive` finds of a subarray.
-    pub fn receive(&self, part: &Subarray) -> Received {
+    pub fn receive(&self, part: &Subarray) -> SubarrayStats {
         let sensor = &self.scene.sensor;
         receive(sensor, part, &part.gather(sensor, self.codes), self.floor, self.scene.partition.condition)
     }

@@ -12,7 +12,7 @@
 
 use super::array::{Array, BySearch, CaseOutcome, EngineInput};
 use super::contacts::by_network::NetworkContacts;
-use super::contacts::{Contacts, MeasuredStress, Solver};
+use super::contacts::{MeasuredStress, SolvedContacts, Solver};
 use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::forces::threshold;
@@ -50,7 +50,7 @@ pub(super) fn taxels(scene: &Scene) -> Option<Taxels> {
 
 impl Array {
     /// The contacts of a frame with their μ; `None` if no candidate is compressive.
-    pub(super) fn find_contacts(&self, taxels: Option<&Taxels>, input: &EngineInput) -> Option<Contacts> {
+    pub(super) fn find_contacts(&self, taxels: Option<&Taxels>, input: &EngineInput) -> Option<SolvedContacts> {
         let (scene, matrices, b) = (input.scene, self.matrices(), &input.frame.stress_MPa);
         let family = Polynomial::new(matrices, b);
         let found = search(&family, scene.search.mu_max, &|p| Sparse::default().score(p))?;
@@ -66,7 +66,7 @@ impl Array {
         &self,
         input: &EngineInput,
         mut outcome: CaseOutcome,
-        contacts: &Contacts,
+        contacts: &SolvedContacts,
         sigma: Option<Vec<Option<[f64; 2]>>>,
     ) -> Reconstruction {
         let (x, truncation) = self.whole().apply_form(&input.frame.stress_MPa, contacts.forces());
@@ -131,7 +131,7 @@ pub(super) fn by_network(array: &Array, input: &EngineInput, network: &Learned, 
 
 /// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
 /// condition.
-fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
+fn regions(sensor: &Sensor, contacts: &SolvedContacts, met: &[bool], forces: &Forces) -> Vec<Region> {
     let region = |k: usize| Region {
         centroid_condition: met[k],
         mu: contacts.mu(k),

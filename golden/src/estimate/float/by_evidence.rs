@@ -37,7 +37,7 @@ pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<B
         return Err(MatricesError::NotFinite { sensor: sensor() }.into());
     }
     if kind.has_network() {
-        evidence = evidence.advised_by(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
+        evidence = evidence.with_network(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
     }
     if let Some(shares) = input.noise_shares() {
         evidence = evidence.with_noise_shares(shares);

@@ -1,4 +1,4 @@
-//! By network: μ as a trained network knows it, in the place of a search; p(μ) is then that of the search.
+//! By network: μ from a trained network, in place of a search; p(μ) is then that of the search.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -12,7 +12,7 @@ use super::array::{Array, EngineInput, Solve};
 use super::by_contacts;
 use super::error::GoldenError;
 use super::estimator::{Clipped, Estimator};
-use super::objective::Estimate;
+use super::objective::MuEstimate;
 use super::pass;
 use crate::estimate::learned::{Learned, OneContact};
 use crate::physics::matrices::Matrices;
@@ -78,13 +78,13 @@ impl Estimator for ByNetworkOfContacts {
 }
 
 impl Solve for ByNetwork {
-    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, _: f64) -> (Option<Estimate>, Vec<f64>) {
-        let told = self.network.shear(&OneContact { b, alive: &self.alive, centre_mm: [0.0; 2] });
-        let p = pass::at(matrices, b, told.mean);
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, _: f64) -> (Option<MuEstimate>, Vec<f64>) {
+        let output = self.network.shear(&OneContact { b, alive: &self.alive, centre_mm: [0.0; 2] });
+        let p = pass::at(matrices, b, output.mean);
         let sum: f64 = p.iter().sum();
         // No candidate is compared: that Σp presses is all that counts.
         match sum > 0.0 && sum.is_finite() {
-            true => (Some(Estimate::of_network(&told, mu_max)), p),
+            true => (Some(MuEstimate::of_network(&output, mu_max)), p),
             false => (None, pass::at(matrices, b, [0.0; 2])),
         }
     }

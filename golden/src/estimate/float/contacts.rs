@@ -62,7 +62,7 @@ const RELAXATIONS: usize = 60;
 
 /// The contacts found in one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contacts {
+pub struct SolvedContacts {
     /// Region of each taxel, if it belongs to one.
     pub segments: Segments,
     /// Result of the last search in each region, `None` where it was not searched or no candidate was admissible.
@@ -102,7 +102,7 @@ pub struct Solver<'a> {
     pub searched: &'a dyn Fn(&Segments, usize) -> bool,
 }
 
-impl Contacts {
+impl SolvedContacts {
     /// Ratio of shear to normal force of a region, [x, y]; 0 where it was not searched.
     pub fn mu(&self, region: usize) -> [f64; 2] {
         mu_of(&self.found[region])
@@ -127,16 +127,16 @@ fn mu_of(found: &Option<SearchResult>) -> [f64; 2] {
 
 impl Solver<'_> {
     /// Finds the contacts, starting from the polynomial of one μ for the whole array and the result of its search.
-    pub fn solve(&self, family: &Polynomial, found: SearchResult) -> Contacts {
+    pub fn solve(&self, family: &Polynomial, found: SearchResult) -> SolvedContacts {
         let p = family.eval(found.mu);
         let segments = Segments::whole(p.len());
-        let start = Contacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
+        let start = SolvedContacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
         let fit = self.fit(&start);
         if let Some(fitted) = fit.as_ref().and_then(|fit| self.contacts_of_fit(fit, &start)) {
             return fitted;
         }
         let mut best = (found.objective, start.clone());
-        let mut keep = |state: Contacts| {
+        let mut keep = |state: SolvedContacts| {
             let cost = REGION_COST * (state.segments.count - 1) as f64;
             if let Some(score) = self.objective.score(&state.p).filter(|score| score - cost > best.0) {
                 best = (score - cost, state);
@@ -158,7 +158,7 @@ impl Solver<'_> {
     }
 
     /// Solves for the regions of `draw(p)`, drawn anew from each better p.
-    fn solve_regions(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &Contacts) -> Contacts {
+    fn solve_regions(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &SolvedContacts) -> SolvedContacts {
         let mut state = self.with_regions(start, draw(&start.p));
         if state.segments.count == 1 {
             return start.clone();
@@ -171,7 +171,7 @@ impl Solver<'_> {
                 state.found.remove(b);
                 state.segments = state.segments.joined(a, b);
                 if state.segments.count == 1 {
-                    return Contacts { sweeps: state.sweeps, ..start.clone() };
+                    return SolvedContacts { sweeps: state.sweeps, ..start.clone() };
                 }
                 self.sweep(&mut state);
             }
@@ -179,22 +179,22 @@ impl Solver<'_> {
             if segments == state.segments || segments == before {
                 return state;
             }
-            state = Contacts { converged: false, ..self.with_regions(&state, segments) };
+            state = SolvedContacts { converged: false, ..self.with_regions(&state, segments) };
         }
         self.sweep(&mut state);
         state
     }
 
     /// The state with new regions, each with the μ that its strongest taxel had.
-    fn with_regions(&self, state: &Contacts, segments: Segments) -> Contacts {
+    fn with_regions(&self, state: &SolvedContacts, segments: Segments) -> SolvedContacts {
         let strongest = |region: usize| segments.taxels(region).max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]));
         let before = |taxel: usize| state.segments.labels[taxel].and_then(|region| state.found[region]);
         let old = |region| strongest(region).and_then(before);
-        Contacts { found: (0..segments.count).map(old).collect(), segments, ..state.clone() }
+        SolvedContacts { found: (0..segments.count).map(old).collect(), segments, ..state.clone() }
     }
 
     /// Searches all regions in turn until no μ moves.
-    fn sweep(&self, state: &mut Contacts) {
+    fn sweep(&self, state: &mut SolvedContacts) {
         let searched: Vec<bool> = (0..state.segments.count).map(|k| (self.searched)(&state.segments, k)).collect();
         for (found, searched) in state.found.iter_mut().zip(&searched) {
             *found = found.filter(|_| *searched);
@@ -221,7 +221,7 @@ impl Solver<'_> {
     }
 
     /// The polynomial of one region's μ, the other regions held constant.
-    fn family(&self, state: &Contacts, region: usize) -> Polynomial {
+    fn family(&self, state: &SolvedContacts, region: usize) -> Polynomial {
         let inside = |k: usize| state.segments.labels[k] == Some(region);
         let other_mu: Vec<[f64; 2]> =
             (0..state.p.len()).map(|k| if inside(k) { [0.0; 2] } else { state.mu_of_taxel(k) }).collect();
@@ -263,7 +263,7 @@ impl Solver<'_> {
     }
 
     /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it converges.
-    fn relax(&self, state: &mut Contacts) {
+    fn relax(&self, state: &mut SolvedContacts) {
         let mu: Vec<[f64; 2]> = (0..state.p.len()).map(|taxel| state.mu_of_taxel(taxel)).collect();
         for _ in 0..RELAXATIONS {
             let next = self.iterate(&state.p, &mu);
@@ -277,7 +277,7 @@ impl Solver<'_> {
     }
 
     /// The pair of neighbouring regions with the most similar μ, if it is within [`MU_MERGE_DISTANCE`].
-    fn similar_pair(&self, state: &Contacts) -> Option<(usize, usize)> {
+    fn similar_pair(&self, state: &SolvedContacts) -> Option<(usize, usize)> {
         let labels = &state.segments.labels;
         let sensor = &self.matrices.sensor;
         let pairs = (0..labels.len()).flat_map(|k| neighbours(sensor, k).map(move |other| (labels[k], labels[other])));

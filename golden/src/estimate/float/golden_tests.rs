@@ -3,7 +3,7 @@
 use super::*;
 use crate::data::frame::{Contact, Forces, Frame};
 use crate::data::generator::generate;
-use crate::data::reception::Received;
+use crate::data::reception::SubarrayStats;
 use crate::estimate::float::forces::residual;
 use crate::estimate::learned::{self, Training};
 use crate::result::flags::Flag;
@@ -231,7 +231,7 @@ fn subarrays_have_the_standard_deviation_of_their_shear() {
     let mut scene = scene();
     scene.partition.case = Case::numbered(2).unwrap();
     let parts = crate::spec::partition::subarrays(scene.partition.case, &scene.sensor).unwrap();
-    let received = || Received {
+    let received = || SubarrayStats {
         max_code: 1,
         positive: true,
         negative: false,

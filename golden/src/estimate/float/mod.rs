@@ -40,6 +40,7 @@ mod estimator;
 mod golden;
 #[cfg(test)]
 mod golden_tests;
+mod longer_ratio;
 mod over_time;
 mod run;
 mod template;

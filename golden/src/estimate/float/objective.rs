@@ -31,7 +31,7 @@ pub mod taxels;
 
 pub use auto::Auto;
 pub use compressive::Compressive;
-pub use estimate::{Estimate, Objective, SearchInput};
+pub use estimate::{MuEstimate, Objective, SearchInput};
 pub(crate) use fit::misfit_limit;
 pub use patch::Patch;
 pub use sparse::{Sparse, EPSILON};

@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! longest mean ── estimate ── forces ── template ── fit to (newest mean − longest mean) ─┬─ it holds: forces + changes
-//!                                                                                       └─ else: estimate of the window
+//!                                                                                       └─ else: estimate of the window,
+//!                                                                                          μ of longer means
 //! ```
 //! While a contact holds, its forces follow the newest frames, and its pressure has the noise of the longest mean. What the
 //! template leaves is judged over the last [`FRAMES`] frames; a frame that it does not explain at all ends it at once. The newest mean
-//! is the longest one after which the forces have not changed either.
+//! is the longest one after which the forces have not changed either. Of a contact that moves, the ratio of shear to normal force is
+//! that of longer means as far as they agree with the window (`longer_ratio`).
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -15,6 +17,7 @@
 
 use super::error::GoldenError;
 use super::golden::Golden;
+use super::longer_ratio;
 use super::template::{Influences, Template};
 use crate::data::frame::Frame;
 use crate::data::input::means::{Means, Window};
@@ -40,8 +43,8 @@ const PRESSES: f64 = 3.0;
 pub struct Past {
     /// Of the readings.
     pub memory: Memory,
-    /// The fits of the last frame by the estimator `evidence`: of its mean, and of its longest mean.
-    fits: [Option<LastFit>; 2],
+    /// The fits of the last frame by the estimator `evidence`: of its mean, of its longest mean but one, and of its longest mean.
+    fits: [Option<LastFit>; 3],
     /// Mean residual of the template; `None` before a frame.
     residual: Option<f64>,
 }
@@ -92,17 +95,18 @@ impl Golden {
     fn next(&self, past: &mut Past, influences: &Influences, frame: &Frame) -> Result<Reconstruction, GoldenError> {
         let newest = std::slice::from_ref(frame);
         let window = self.input.average_after(&mut past.memory, self.scene(), newest)?;
-        let Past { memory, fits: [of_window, of_longest], residual } = past;
+        let Past { memory, fits: [of_window, of_long, of_longest], residual } = past;
         let (Some(means), Some(sigma_MPa)) = (memory.means(), memory.sigma_MPa()) else {
             return self.of_mean(of_window, memory, newest, &window);
         };
         let longest = means.longest();
-        let held = Averaged {
-            mean: Frame { stress_MPa: means.mean(&longest), ..window.mean.clone() },
-            variance: longest.variance,
-            frames_held: Some(longest.frames_held()),
-            lag_frames: Some(longest.age),
+        let averaged = |own: &Window| Averaged {
+            mean: Frame { stress_MPa: means.mean(own), ..window.mean.clone() },
+            variance: own.variance,
+            frames_held: Some(own.frames_held()),
+            lag_frames: Some(own.age),
         };
+        let held = averaged(&longest);
         let mut result = self.of_mean(of_longest, memory, newest, &held)?;
         let explained = self.explain(influences, means, sigma_MPa, (&held.mean, &result));
         let before = residual.unwrap_or(1.0);
@@ -120,7 +124,18 @@ impl Golden {
                 result.extra.lag_frames = Some(age);
             }
             None if window.variance == held.variance => (),
-            None => result = self.of_mean(of_window, memory, newest, &window)?,
+            None => {
+                let mut own = self.of_mean(of_window, memory, newest, &window)?;
+                let long = means.singles().into_iter().nth(1).filter(|long| long.variance < window.variance);
+                let long = long.map(|long| self.of_mean(of_long, memory, newest, &averaged(&long))).transpose()?;
+                // From short to long: what of μ has changed shows against the noise of the mean before.
+                for longer in long.iter().chain([&result]) {
+                    if let Some(changes) = longer_ratio::changes(self.scene(), &own, longer) {
+                        own.change(self.scene(), &window.mean, &changes);
+                    }
+                }
+                result = own;
+            }
         }
         result.extra.template = template;
         Ok(result)
@@ -160,8 +175,8 @@ impl Golden {
         let changes = changes.map(|((force_N, shares_of_variance), shares)| {
             // The error of the remembered pressure is in proportion to the change.
             let shape_N = SHAPE_ERROR * force_N.iter().map(|own| own * own).sum::<f64>().sqrt() / f64::sqrt(3.0);
-            let sigma_N = shares_of_variance.map(|share| (share * variance).sqrt().hypot(shape_N));
-            ForceChange { force_N, sigma_N, shares: shares.clone() }
+            let variance_N2 = shares_of_variance.map(|share| share * variance + shape_N * shape_N);
+            ForceChange { force_N, variance_N2, shares: shares.clone() }
         });
         Some(Explained { changes: changes.collect(), age: newest.age, residual, sigma: (2.0 / freedom).sqrt() })
     }

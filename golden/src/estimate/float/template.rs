@@ -111,7 +111,7 @@ impl Template {
 }
 
 /// Share of each taxel in the normal force of each contact; `None` where none presses. Taxels belong to the nearest contact.
-fn shares(sensor: &Sensor, result: &Reconstruction) -> Option<Vec<Vec<f64>>> {
+pub(super) fn shares(sensor: &Sensor, result: &Reconstruction) -> Option<Vec<Vec<f64>>> {
     let pressed: Vec<f64> = result.forces_N.fz.iter().map(|fz| fz.max(0.0)).collect();
     let contacts = result.contacts().unwrap_or_default();
     let centres: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.centre_mm).collect();

@@ -122,12 +122,12 @@ mod tests {
     /// μ by the features and the network behind them, without a composed layer; [`Learned::shear`] gives the same.
     fn by_features(learned: &Learned, contact: &OneContact) -> Gaussian {
         let features = learned.features.of(&learned.readings(contact));
-        let (told, own) = (learned.in_scene(learned.network.shear(features)[0]), learned.shear(contact));
+        let (output, own) = (learned.in_scene(learned.network.shear(features)[0]), learned.shear(contact));
         for axis in [0, 1] {
-            assert!((own.mean[axis] - told.mean[axis]).abs() < 1e-4, "{own:?} {told:?}");
-            assert!((own.sigma[axis] - told.sigma[axis]).abs() < 1e-4, "{own:?} {told:?}");
+            assert!((own.mean[axis] - output.mean[axis]).abs() < 1e-4, "{own:?} {output:?}");
+            assert!((own.sigma[axis] - output.sigma[axis]).abs() < 1e-4, "{own:?} {output:?}");
         }
-        told
+        output
     }
 
     /// Around a contact the first layer takes the mask; the window has middle lines.
@@ -143,7 +143,7 @@ mod tests {
         let window = learned.signature.window;
         for [row, col] in [[9, 9], [1, 17]] {
             let centre_mm = scene.sensor.position_mm(row, col);
-            let told = by_features(&learned, &OneContact { b: &b, alive: &alive, centre_mm });
+            let output = by_features(&learned, &OneContact { b: &b, alive: &alive, centre_mm });
             let taxels = window.taxels_of(&scene.sensor, window.origin(&scene.sensor, centre_mm));
             let taxels: Vec<Option<usize>> = taxels.into_iter().map(|t| t.filter(|t| alive[*t])).collect();
             let peak = taxels.iter().flatten().map(|t| b[*t].abs()).fold(0.0, f64::max);
@@ -158,8 +158,8 @@ mod tests {
             let found = outputs(&learned.composed(&alive), stress, Some(&mask));
             for axis in [0, 1] {
                 let [mu, ln] = [0, 2].map(|first| f64::from(found[(first + axis, 0)]));
-                assert!((mu * scene.search.mu_max - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
-                assert!((ln.exp() * scene.search.mu_max - told.sigma[axis]).abs() < 1e-4, "{ln} {told:?}");
+                assert!((mu * scene.search.mu_max - output.mean[axis]).abs() < 1e-4, "{mu} {output:?}");
+                assert!((ln.exp() * scene.search.mu_max - output.sigma[axis]).abs() < 1e-4, "{ln} {output:?}");
             }
         }
     }
@@ -168,7 +168,7 @@ mod tests {
     fn composed_layers_are(learned: &Learned, scene: &Scene, b: &[f64]) {
         for dead in [vec![], vec![37, 5]] {
             let alive: Vec<bool> = (0..b.len()).map(|taxel| !dead.contains(&taxel)).collect();
-            let told = by_features(learned, &OneContact { b, alive: &alive, centre_mm: [0.0; 2] });
+            let output = by_features(learned, &OneContact { b, alive: &alive, centre_mm: [0.0; 2] });
             let peak = (0..b.len()).filter(|t| alive[*t]).map(|t| b[t].abs()).fold(0.0, f64::max);
             let s = f64::from(power_above(peak as f32));
             let quads = Quads { rows: scene.sensor.rows, cols: scene.sensor.cols };
@@ -177,8 +177,8 @@ mod tests {
             let found = outputs(&learned.composed(&alive), exchanged(std::array::from_fn(image)), None);
             for axis in [0, 1] {
                 let [mu, ln] = [0, 2].map(|first| f64::from(found[(first + axis, 0)]));
-                assert!((mu * scene.search.mu_max - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
-                assert!((ln.exp() * scene.search.mu_max - told.sigma[axis]).abs() < 1e-4, "{ln} {told:?}");
+                assert!((mu * scene.search.mu_max - output.mean[axis]).abs() < 1e-4, "{mu} {output:?}");
+                assert!((ln.exp() * scene.search.mu_max - output.sigma[axis]).abs() < 1e-4, "{ln} {output:?}");
             }
         }
     }

@@ -24,7 +24,7 @@
 
 use super::features::Readings;
 use super::options::Training;
-use crate::data::generator::draws::{DrawOptions, Draws, Shape};
+use crate::data::generator::draws::{ContactShape, DrawOptions, Draws};
 use crate::data::generator::support::Support;
 use crate::data::generator::GeneratorError;
 use crate::estimate::float::objective::taxels::Taxels;
@@ -105,7 +105,7 @@ impl Frames {
         let draws = (1..=most)
             .map(|contacts| {
                 let (ratio, shapes) =
-                    ([0.0, RATIO * scene.search.mu_max], Shape::NAMES.map(|(_, shape)| shape).to_vec());
+                    ([0.0, RATIO * scene.search.mu_max], ContactShape::NAMES.map(|(_, shape)| shape).to_vec());
                 let slip = training.slip;
                 Draws::new(scene, DrawOptions { shapes, contacts, ratio, slip, seed, ..Default::default() })
             })

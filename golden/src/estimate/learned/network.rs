@@ -168,13 +168,14 @@ impl Network {
 
     /// Moves every weight and bias towards those of `other` by this share of the way.
     pub fn approach(&mut self, other: &Network, share: f32) {
-        let towards = |own: &mut [f32], other: &[f32]| {
-            own.iter_mut().zip(other).for_each(|(own, other)| *own += share * (other - *own));
+        let towards = |values: &mut [f32], other: &[f32]| {
+            values.iter_mut().zip(other).for_each(|(value, other)| *value += share * (other - *value));
         };
-        for (own, other) in self.layers.iter_mut().zip(&other.layers) {
-            towards(&mut own.bias, &other.bias);
-            for (own, other) in own.weights.iter_mut().zip(&other.weights) {
-                (0..own.ncols()).for_each(|column| towards(own.col_as_slice_mut(column), other.col_as_slice(column)));
+        for (layer, other) in self.layers.iter_mut().zip(&other.layers) {
+            towards(&mut layer.bias, &other.bias);
+            for (weights, other) in layer.weights.iter_mut().zip(&other.weights) {
+                (0..weights.ncols())
+                    .for_each(|column| towards(weights.col_as_slice_mut(column), other.col_as_slice(column)));
             }
         }
     }

@@ -24,7 +24,8 @@ use crate::spec::quads::Quads;
 use faer::Mat;
 use prost::Message;
 use proto::{
-    Attribute, Dimension, Entry, Graph, Model, Node, OperatorSet, Shape, Tensor, TensorType, Type, Value, FLOAT, INT64,
+    Attribute, Dimension, Entry, Graph, Model, Node, OperatorSet, Tensor, TensorShape, TensorType, Type, Value, FLOAT,
+    INT64,
 };
 use std::f32::consts::LN_2;
 
@@ -201,7 +202,7 @@ fn dimension(length: Option<usize>) -> Dimension {
 
 /// An input or output.
 fn value(name: &str, doc: &str, dim: Vec<Dimension>) -> Value {
-    let tensor_type = TensorType { elem_type: FLOAT, shape: Some(Shape { dim }) };
+    let tensor_type = TensorType { elem_type: FLOAT, shape: Some(TensorShape { dim }) };
     Value { name: name.to_owned(), of_type: Some(Type { tensor_type: Some(tensor_type) }), doc_string: doc.to_owned() }
 }
 

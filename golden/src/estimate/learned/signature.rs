@@ -153,20 +153,20 @@ impl SensorRange {
         let share = |axis: i32| (0.5 + (index + 1) as f64 * BASE.powi(-axis)).fract();
         let at = |[low, high]: [f64; 2], share: f64| low + share * (high - low);
         let pitch = |share: f64| at(self.pitch_over_thickness.map(f64::ln), share).exp() * scene.sensor.thickness_mm;
-        let mut own = scene.clone();
-        (own.sensor.pitch_x_mm, own.sensor.pitch_y_mm) = (pitch(share(1)), pitch(share(2)));
+        let mut drawn = scene.clone();
+        (drawn.sensor.pitch_x_mm, drawn.sensor.pitch_y_mm) = (pitch(share(1)), pitch(share(2)));
         if let Some(poisson) = self.poisson {
-            own.medium = Medium::BondedLayer { poisson: at(poisson, share(3)) };
+            drawn.medium = Medium::BondedLayer { poisson: at(poisson, share(3)) };
         }
         if let Some(least) = self.least_side {
             let side = |largest: usize, pitch_mm: f64, share: f64| {
-                let fewer = largest.saturating_sub(fewest(least, pitch_mm, own.sensor.thickness_mm)) / 2;
+                let fewer = largest.saturating_sub(fewest(least, pitch_mm, drawn.sensor.thickness_mm)) / 2;
                 largest - 2 * ((share * (fewer + 1) as f64) as usize).min(fewer)
             };
-            let rows = side(own.sensor.rows, own.sensor.pitch_y_mm, share(4));
-            (own.sensor.cols, own.sensor.rows) = (side(own.sensor.cols, own.sensor.pitch_x_mm, share(5)), rows);
+            let rows = side(drawn.sensor.rows, drawn.sensor.pitch_y_mm, share(4));
+            (drawn.sensor.cols, drawn.sensor.rows) = (side(drawn.sensor.cols, drawn.sensor.pitch_x_mm, share(5)), rows);
         }
-        own
+        drawn
     }
 
     /// The field of a sensor that is not in the range, the range, and the value.

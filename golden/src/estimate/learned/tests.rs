@@ -20,7 +20,7 @@ fn trained(scene: &Scene, steps: usize) -> Trained {
     Learned::train(scene, &small(steps), &mut |_| Continue(())).unwrap()
 }
 
-fn ask(learned: &Learned, b: &[f64], alive: &[bool], centre_mm: [f64; 2]) -> Gaussian {
+fn evaluate(learned: &Learned, b: &[f64], alive: &[bool], centre_mm: [f64; 2]) -> Gaussian {
     learned.shear(&OneContact { b, alive, centre_mm })
 }
 
@@ -41,7 +41,7 @@ fn a_small_network_learns() {
     let mut errors: Vec<f64> = Vec::new();
     for number in 0..60 {
         let drawn = draws.frame(number).unwrap();
-        let found = ask(&learned, &drawn.exact_MPa, &[true; 100], [0.0; 2]);
+        let found = evaluate(&learned, &drawn.exact_MPa, &[true; 100], [0.0; 2]);
         let [x, y, normal] = drawn.total_N;
         let off = [0, 1].map(|axis| found.mean[axis] - [x, y][axis] / normal);
         errors.push(off[0].hypot(off[1]) * normal / x.hypot(y));
@@ -75,7 +75,7 @@ fn an_ended_training_gives_its_network() {
     .unwrap();
     assert_eq!((steps, stages.len()), (40, 2));
     assert!(stages.iter().all(|stage| stage.done < 0.4 && stage.loss.is_finite()));
-    assert!(ask(&learned, &vec![0.1; 100], &[true; 100], [0.0; 2]).sigma.iter().all(|sigma| *sigma > 0.0));
+    assert!(evaluate(&learned, &vec![0.1; 100], &[true; 100], [0.0; 2]).sigma.iter().all(|sigma| *sigma > 0.0));
     // So much time is over after the first step.
     let brief = Training { minutes: Some(1e-9), ..small(100) };
     assert_eq!(Learned::train(&scene, &brief, &mut |_| Continue(())).unwrap().steps, 1);
@@ -106,7 +106,7 @@ fn a_range_is_trained_and_read_for_each_sensor() {
     let sensors = learned.signature().cover.scenes(&scene, 3);
     let b: Vec<f64> = (0..64).map(|taxel| f64::from(taxel % 7) - 1.0).collect();
     let found: Vec<Gaussian> =
-        sensors.iter().map(|scene| ask(&read(scene).unwrap(), &b, &[true; 64], [0.0; 2])).collect();
+        sensors.iter().map(|scene| evaluate(&read(scene).unwrap(), &b, &[true; 64], [0.0; 2])).collect();
     assert!(found[0] != found[1] && found[1] != found[2]);
     let mut finer = scene.clone();
     finer.sensor.pitch_x_mm = 2.9;
@@ -120,10 +120,10 @@ fn answers_follow_the_symmetries() {
     let learned = trained(&scene, 60).learned;
     let drawn = Draws::new(&scene, DrawOptions::default()).unwrap().frame(4).unwrap();
     let b = &drawn.exact_MPa;
-    let found = ask(&learned, b, &[true; 100], [0.0; 2]);
+    let found = evaluate(&learned, b, &[true; 100], [0.0; 2]);
     assert!(found.mean.iter().all(|mu| mu.abs() > 1e-3), "{found:?}");
     let heavy: Vec<f64> = b.iter().map(|b| 8.0 * b).collect();
-    assert!(near(found, ask(&learned, &heavy, &[true; 100], [0.0; 2]), [1.0; 2]));
+    assert!(near(found, evaluate(&learned, &heavy, &[true; 100], [0.0; 2]), [1.0; 2]));
     let quads = learned.signature.window.quads();
     for across in 0..4 {
         let image = |t: usize| {
@@ -132,17 +132,17 @@ fn answers_follow_the_symmetries() {
         };
         let image: Vec<f64> = (0..100).map(image).collect();
         let sign = [1, 2].map(|axis| if across & axis != 0 { -1.0 } else { 1.0 });
-        assert!(near(ask(&learned, &image, &[true; 100], [0.0; 2]), found, sign), "{across}");
+        assert!(near(evaluate(&learned, &image, &[true; 100], [0.0; 2]), found, sign), "{across}");
     }
     let mut alive = vec![true; 100];
     alive[44] = false;
     let mut stuck = b.clone();
     stuck[44] = 9.0;
-    assert_eq!(ask(&learned, b, &alive, [0.0; 2]), ask(&learned, &stuck, &alive, [0.0; 2]));
+    assert_eq!(evaluate(&learned, b, &alive, [0.0; 2]), evaluate(&learned, &stuck, &alive, [0.0; 2]));
 }
 
 /// Where a network alone gives the μ of each contact, it has a window around each also on a small array; one that reads the
-/// whole array would give all of them the same μ. The adviser of `evidence`, which takes the others out, takes either.
+/// whole array would give all of them the same μ. `evidence` with a network, which takes the others out, takes either.
 #[test]
 fn several_contacts_need_a_window_around_each() {
     let mut scene = scene("sensor-1");
@@ -191,7 +191,7 @@ fn a_window_moves_with_its_contact() {
     let at = |learned: &Learned, cols: usize, place: [usize; 2]| {
         let [row, col] = place;
         let centre = learned.sensor.position_mm(row, col + 1);
-        ask(learned, &stress(cols, place), &alive, centre)
+        evaluate(learned, &stress(cols, place), &alive, centre)
     };
     let first = at(&learned, 20, [8, 8]);
     assert_eq!(first, at(&learned, 20, [10, 9]));

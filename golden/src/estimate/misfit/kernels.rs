@@ -132,34 +132,34 @@ impl CellKernels {
         }
     }
 
-    /// The transposed product: for each cell Σ K(taxel − cell) of(taxel), in `cells`; `of` is 0 behind the last taxel.
+    /// The transposed product: for each cell Σ K(taxel − cell) value(taxel), in `cells`; `values` are 0 behind the last taxel.
     #[inline(always)]
-    pub fn transposed<S: Simd>(&self, simd: S, of: &[f32], cells: &mut [f32]) {
-        let (of, _) = S::as_simd_f32s(of);
+    pub fn transposed<S: Simd>(&self, simd: S, values: &[f32], cells: &mut [f32]) {
+        let (values, _) = S::as_simd_f32s(values);
         let zero = simd.splat_f32s(0.0);
-        let (own, rest) = self.cells.as_chunks::<4>();
+        let (fours, rest) = self.cells.as_chunks::<4>();
         let (sums, rest_sums) = cells.as_chunks_mut::<4>();
         // Four at a time, so that none waits for the sum of the one before.
-        for (own, sums) in own.iter().zip(sums) {
-            let [a, b, c, d] = own.map(|cell| self.entries::<S>(cell));
-            let mut all = (zero, zero, zero, zero);
-            for ((((of, a), b), c), d) in of.iter().zip(a).zip(b).zip(c).zip(d) {
-                all.0 = simd.mul_add_e_f32s(*of, *a, all.0);
-                all.1 = simd.mul_add_e_f32s(*of, *b, all.1);
-                all.2 = simd.mul_add_e_f32s(*of, *c, all.2);
-                all.3 = simd.mul_add_e_f32s(*of, *d, all.3);
+        for (four, sums) in fours.iter().zip(sums) {
+            let [a, b, c, d] = four.map(|cell| self.entries::<S>(cell));
+            let mut totals = (zero, zero, zero, zero);
+            for ((((value, a), b), c), d) in values.iter().zip(a).zip(b).zip(c).zip(d) {
+                totals.0 = simd.mul_add_e_f32s(*value, *a, totals.0);
+                totals.1 = simd.mul_add_e_f32s(*value, *b, totals.1);
+                totals.2 = simd.mul_add_e_f32s(*value, *c, totals.2);
+                totals.3 = simd.mul_add_e_f32s(*value, *d, totals.3);
             }
-            sums[0] = simd.reduce_sum_f32s(all.0);
-            sums[1] = simd.reduce_sum_f32s(all.1);
-            sums[2] = simd.reduce_sum_f32s(all.2);
-            sums[3] = simd.reduce_sum_f32s(all.3);
+            sums[0] = simd.reduce_sum_f32s(totals.0);
+            sums[1] = simd.reduce_sum_f32s(totals.1);
+            sums[2] = simd.reduce_sum_f32s(totals.2);
+            sums[3] = simd.reduce_sum_f32s(totals.3);
         }
-        for (own, sum) in rest.iter().zip(rest_sums) {
-            let mut all = zero;
-            for (of, entries) in of.iter().zip(self.entries::<S>(*own)) {
-                all = simd.mul_add_e_f32s(*of, *entries, all);
+        for (cell, sum) in rest.iter().zip(rest_sums) {
+            let mut totals = zero;
+            for (value, entries) in values.iter().zip(self.entries::<S>(*cell)) {
+                totals = simd.mul_add_e_f32s(*value, *entries, totals);
             }
-            *sum = simd.reduce_sum_f32s(all);
+            *sum = simd.reduce_sum_f32s(totals);
         }
     }
 }

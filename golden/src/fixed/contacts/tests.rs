@@ -35,7 +35,7 @@ fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
     of.extra.regions.iter().flatten().max_by_key(common).unwrap()
 }
 
-/// Every contact has the μ and σ that the network says of the window around its middle, up to rounding.
+/// Every contact has the μ and σ that the network gives for the window around its middle, up to rounding.
 #[test]
 fn a_contact_has_what_the_network_says_of_its_window() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
@@ -55,13 +55,13 @@ fn a_contact_has_what_the_network_says_of_its_window() {
             let [row, col] = contact.middle;
             let centre_mm = scene.sensor.position_mm(row, col);
             // The codes in place of the stress: the network divides either by a power of two.
-            let told = network.shear(&OneContact { b: &stress, alive: &alive, centre_mm });
+            let output = network.shear(&OneContact { b: &stress, alive: &alive, centre_mm });
             for axis in [0, 1] {
                 let unit = 1.0 / MU_STEPS as f64;
                 let mu = f64::from(contact.position[axis]) * unit * scene.search.mu_max;
-                assert!((mu - told.mean[axis]).abs() < 0.004, "{mu} {told:?} at {row}, {col}");
+                assert!((mu - output.mean[axis]).abs() < 0.004, "{mu} {output:?} at {row}, {col}");
                 let ln = f64::from(contact.ln_sigma[axis]) * unit;
-                assert!((ln - (told.sigma[axis] / scene.search.mu_max).ln()).abs() < 0.01, "{ln} {told:?}");
+                assert!((ln - (output.sigma[axis] / scene.search.mu_max).ln()).abs() < 0.01, "{ln} {output:?}");
             }
             asked += 1;
         }
@@ -166,14 +166,14 @@ fn records_tell_what_forces_tell() {
         let trace = records.run(&records.readings(std::slice::from_ref(&frame)).unwrap());
         assert_eq!((trace.beats.len(), records.force_beats()), (3 * 7, 3 * 7));
         let [all, own] = [&forces, &records].map(|model| model.reconstruct(&frame).unwrap());
-        let [regions, told] = [&all, &own].map(|result| result.extra.regions.as_ref().unwrap());
-        assert_eq!(regions.len(), told.len());
-        for (region, told) in regions.iter().zip(told) {
-            assert_eq!((region.mu, region.mu_sigma, told.taxels.len()), (told.mu, told.mu_sigma, 0));
-            assert_eq!((region.taxels.len(), region.taxel_count), (told.taxel_count, told.taxel_count));
-            assert_eq!(region.centroid_condition, told.centroid_condition);
-            (0..3).for_each(|axis| near(region.load_N[axis], told.load_N[axis]));
-            for (a, b) in [(region.centre_mm, told.centre_mm), (region.shear_sigma_N, told.shear_sigma_N)] {
+        let [regions, recorded] = [&all, &own].map(|result| result.extra.regions.as_ref().unwrap());
+        assert_eq!(regions.len(), recorded.len());
+        for (region, recorded) in regions.iter().zip(recorded) {
+            assert_eq!((region.mu, region.mu_sigma, recorded.taxels.len()), (recorded.mu, recorded.mu_sigma, 0));
+            assert_eq!((region.taxels.len(), region.taxel_count), (recorded.taxel_count, recorded.taxel_count));
+            assert_eq!(region.centroid_condition, recorded.centroid_condition);
+            (0..3).for_each(|axis| near(region.load_N[axis], recorded.load_N[axis]));
+            for (a, b) in [(region.centre_mm, recorded.centre_mm), (region.shear_sigma_N, recorded.shear_sigma_N)] {
                 (0..2).for_each(|axis| near(a.unwrap()[axis], b.unwrap()[axis]));
             }
         }
@@ -186,8 +186,8 @@ fn records_tell_what_forces_tell() {
         }
         assert_eq!((&all.flags, all.error.is_some()), (&own.flags, own.error.is_some()));
         // The taxels of no contact carry a part of the load.
-        let loads: f64 = told.iter().map(|region| region.load_N[2]).sum();
-        seen[0] += usize::from(told.iter().map(|region| region.taxel_count).sum::<usize>() < 234);
+        let loads: f64 = recorded.iter().map(|region| region.load_N[2]).sum();
+        seen[0] += usize::from(recorded.iter().map(|region| region.taxel_count).sum::<usize>() < 234);
         seen[1] += usize::from((own.resultant_N[2] - loads).abs() > 1e-3);
     }
     assert!(seen.iter().all(|&frames| frames > 2), "{seen:?}");

@@ -11,7 +11,7 @@ use super::contents::{CasePlan, ContactPlan, Dropped, OwnTables, Plan};
 use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::specimens::specimens;
-use super::widths::{widths, Shape};
+use super::widths::{widths, CaseMatrices};
 use crate::estimate::deviations::Deviations;
 use crate::estimate::misfit::Misfit;
 use crate::estimate::segment::{self, Segmenter};
@@ -60,8 +60,8 @@ pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Resul
     match scene.partition.case {
         Case::Adaptive => several(scene, &scale, degree, &board),
         case => {
-            let others = other_shapes(scene, case, degree)?;
-            of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)], &others)
+            let specimens = specimen_matrices(scene, case, degree)?;
+            plan_of(scene, &scale, &board, vec![(case, case_matrices(scene, case, degree)?)], &specimens)
         }
     }
 }
@@ -77,21 +77,21 @@ fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -
     }
     let short = |plan: &Plan| plan.resources.shortages(&plan.board);
     // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
-    let whole = shape(scene, Case::WHOLE, degree)?;
+    let whole = case_matrices(scene, Case::WHOLE, degree)?;
     if !listed {
-        let alone = of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())], &[])?;
+        let alone = plan_of(scene, scale, board, vec![(Case::WHOLE, whole.clone())], &[])?;
         if !short(&alone).is_empty() {
             return Ok(alone);
         }
     }
-    let mut shapes = vec![whole];
+    let mut matrices = vec![whole];
     for &case in &choices[1..] {
-        shapes.push(shape(scene, case, degree)?);
+        matrices.push(case_matrices(scene, case, degree)?);
     }
     let all: Vec<usize> = (0..choices.len()).collect();
     let of = |subset: &[usize]| -> Result<Plan, FixedError> {
-        let pick = |&at: &usize| (choices[at], shapes[at].clone());
-        of_shapes(scene, scale, board, subset.iter().map(pick).collect(), &[])
+        let pick = |&at: &usize| (choices[at], matrices[at].clone());
+        plan_of(scene, scale, board, subset.iter().map(pick).collect(), &[])
     };
     if listed {
         return of(&all);
@@ -116,16 +116,16 @@ fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -
     Ok(plan)
 }
 
-/// The plan of `cases`; where there are several, case 0 is the first. Its formats serve `others` as well.
-fn of_shapes(
+/// The plan of `cases`; where there are several, case 0 is the first. Its formats serve `specimens` as well.
+fn plan_of(
     scene: &Scene,
     scale: &Scale,
     board: &Board,
-    cases: Vec<(Case, Shape)>,
-    others: &[Shape],
+    cases: Vec<(Case, CaseMatrices)>,
+    specimens: &[CaseMatrices],
 ) -> Result<Plan, FixedError> {
-    let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
-    let (designs, resources) = fit(scene, &shapes, board, widths(scene, &shapes, others, board)?);
+    let (cases, matrices): (Vec<Case>, Vec<CaseMatrices>) = cases.into_iter().unzip();
+    let (designs, resources) = fit(scene, &matrices, board, widths(scene, &matrices, specimens, board)?);
     let force_exponent = designs[0].formats.force_exponent;
     let mut scene = scene.clone();
     let mut planned = Vec::with_capacity(cases.len());
@@ -230,12 +230,12 @@ fn parts(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {
     subarrays(if case == Case::Contacts { Case::WHOLE } else { case }, sensor)
 }
 
-/// The shapes of the specimens at the bounds of `hardware.table_range`.
-fn other_shapes(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Vec<Shape>, FixedError> {
+/// The matrices of the specimens at the bounds of `hardware.table_range`.
+fn specimen_matrices(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Vec<CaseMatrices>, FixedError> {
     let of = |specimen: &Scene| {
-        let shape = shape(specimen, case, degree)?;
+        let matrices = case_matrices(specimen, case, degree)?;
         let margin = scene.hardware.table_range.dead_taxels > 0 && !specimen.input.dead.is_empty();
-        Ok(if margin { shape.scaled(DEAD_MARGIN) } else { shape })
+        Ok(if margin { matrices.scaled(DEAD_MARGIN) } else { matrices })
     };
     specimens(scene).iter().map(of).collect()
 }
@@ -246,9 +246,9 @@ fn other_shapes(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Vec<
 /// Those of the matrices.
 pub fn requantised(plan: &Plan, specimen: &Scene) -> Result<Option<Quantised>, FixedError> {
     let (own, case) = (plan.first(), plan.first().case);
-    let mut others = other_shapes(&plan.scene, case, None)?;
-    others.push(shape(&plan.scene, case, None)?);
-    let widths = widths(&plan.scene, &[shape(specimen, case, None)?], &others, &plan.board)?;
+    let mut specimens = specimen_matrices(&plan.scene, case, None)?;
+    specimens.push(case_matrices(&plan.scene, case, None)?);
+    let widths = widths(&plan.scene, &[case_matrices(specimen, case, None)?], &specimens, &plan.board)?;
     let Formats { lanes_per_parity, groups, .. } = own.formats;
     let same = Formats { lanes_per_parity, groups, ..widths.formats } == own.formats;
     Ok(widths.quantised.into_iter().next().filter(|_| same))
@@ -256,13 +256,13 @@ pub fn requantised(plan: &Plan, specimen: &Scene) -> Result<Option<Quantised>, F
 
 /// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
 /// needs.
-fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
+fn case_matrices(scene: &Scene, case: Case, degree: Option<usize>) -> Result<CaseMatrices, FixedError> {
     let parts = parts(case, &scene.sensor)?;
     // Scenes with dead taxels have a single subarray.
     let dead = parts[0].local_indices(&scene.input.dead);
     let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;
     matrices.degree = degree.unwrap_or(matrices.degree);
-    Ok(Shape { matrices, parts: parts.len() })
+    Ok(CaseMatrices { matrices, parts: parts.len() })
 }
 
 /// Whether every subarray has the [`SHORTEST_SWEEP`] quads that a search shared by several cases needs.

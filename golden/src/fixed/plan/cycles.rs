@@ -54,7 +54,7 @@ const LAST_SWEEP: u64 = 8;
 const UNSEARCHED: u64 = 3;
 /// Cycles from the values of a frame with contacts to the sending of them, beyond one for each contact that there may be: the
 /// status of the taxels of no contact, and two until they can be requested.
-const TOLD: u64 = 2;
+const CONTACT_STATUS: u64 = 2;
 /// Cycles from the last force, or a beat of labels, to the next beat of labels: a label per cycle, and their memory.
 pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 5;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
@@ -243,8 +243,8 @@ pub(super) fn search(plan: &Plan, case: &CasePlan, searching: bool) -> u64 {
     let sweeps = chained * coarse_period(formats, formats.quads) + awaited * (scored + SET_UP);
     match plan.searches() {
         true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + steps + LAST_SWEEP + split,
-        // Of contacts the statuses are told first.
-        false => UNSEARCHED + if plan.contacts() > 0 { TOLD + plan.contacts() as u64 } else { 0 },
+        // Of contacts the statuses come first.
+        false => UNSEARCHED + if plan.contacts() > 0 { CONTACT_STATUS + plan.contacts() as u64 } else { 0 },
     }
 }
 

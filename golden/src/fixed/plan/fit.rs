@@ -3,7 +3,7 @@
 use super::resources::Resources;
 use super::serial;
 use super::storage::{storage_order, LaidOut, Storage};
-use super::widths::{Shape, Widths};
+use super::widths::{CaseMatrices, Widths};
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{Kind, Matrix};
@@ -24,19 +24,19 @@ pub struct Design {
 }
 
 /// Lays out the coefficient memory of a scene's cases and counts the resources, whether `board` has them or not.
-pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (Vec<Design>, Resources) {
+pub fn fit(scene: &Scene, cases: &[CaseMatrices], board: &Board, widths: Widths) -> (Vec<Design>, Resources) {
     let Widths { formats, quantised } = widths;
     let order = storage_order(&formats);
     let (laid_out, resources) = match board.engine {
         EngineKind::Serial => serial::fit(&formats, &order, &quantised[0], board),
-        EngineKind::Parallel => parallel(&formats, &order, &quantised, scene, shapes, board),
+        EngineKind::Parallel => parallel(&formats, &order, &quantised, scene, cases, board),
     };
-    let design = |((laid_out, mut quantised), shape): ((LaidOut, Quantised), &Shape)| {
+    let design = |((laid_out, mut quantised), case): ((LaidOut, Quantised), &CaseMatrices)| {
         let LaidOut { formats, storage, .. } = laid_out;
-        storage.zero_pruned(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
+        storage.zero_pruned(&mut quantised, case.quads().len(), formats.lanes_per_parity);
         Design { formats, quantised, storage }
     };
-    (laid_out.into_iter().zip(quantised).zip(shapes).map(design).collect(), resources)
+    (laid_out.into_iter().zip(quantised).zip(cases).map(design).collect(), resources)
 }
 
 /// Lanes and memories of the parallel engine: the scene's number of lanes, else the most with which the memories fit, if
@@ -47,7 +47,7 @@ fn parallel(
     matrices: &[Matrix],
     quantised: &[Quantised],
     scene: &Scene,
-    shapes: &[Shape],
+    cases: &[CaseMatrices],
     board: &Board,
 ) -> (Vec<LaidOut>, Resources) {
     let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
@@ -66,11 +66,11 @@ fn parallel(
         Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => 0,
     };
     // Coefficients are written to one memory.
-    let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1 && !written;
+    let narrow_may = formats.inverse_low_bits > 0 && cases.len() == 1 && !written;
     let with = |groups: usize, narrow: bool| {
         let lanes_per_parity = quads.div_ceil(groups);
-        let lay_out = |(quantised, shape): (&Quantised, &Shape)| {
-            let quads = shape.quads().len();
+        let lay_out = |(quantised, case): (&Quantised, &CaseMatrices)| {
+            let quads = case.quads().len();
             let formats =
                 Formats { quads, lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
             let mut order = matrices.to_vec();
@@ -78,9 +78,9 @@ fn parallel(
             let limits = order.into_iter().map(|matrix| (matrix, threshold(quantised, matrix))).collect();
             let storage = Storage::new(limits, quantised, quads, lanes_per_parity);
             let storage = if narrow { storage.with_narrow() } else { storage };
-            LaidOut { formats, storage, parts: shape.parts }
+            LaidOut { formats, storage, parts: case.parts }
         };
-        let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
+        let mut laid_out: Vec<LaidOut> = quantised.iter().zip(cases).map(lay_out).collect();
         Storage::share(laid_out.iter_mut().map(|case| (&mut case.storage, case.formats.clone())));
         let resources = Resources::new(&laid_out, scene, board);
         (laid_out, resources)

@@ -115,17 +115,17 @@ pub fn listing(plan: &Plan) -> Vec<Listed> {
     let parallel = plan.board.engine == EngineKind::Parallel;
     for case in plan.cases().iter().filter(|_| parallel) {
         for (section, (section_name, _)) in sections(&case.formats).iter().zip(runs(case, 0)) {
-            let listed = |(step, own): (usize, Instruction)| Listed {
+            let listed = |(step, instruction): (usize, Instruction)| Listed {
                 case: case.case.to_string(),
                 section: section_name,
                 step,
-                result: result(&case.formats, own.target),
-                group: own.group,
-                matrix: matrix(own.product.matrix),
-                flip: own.product.matrix.flip,
-                operand: operand(&case.formats, &own.product),
-                coefficients: own.coefficients,
-                cycles: own.columns,
+                result: result(&case.formats, instruction.target),
+                group: instruction.group,
+                matrix: matrix(instruction.product.matrix),
+                flip: instruction.product.matrix.flip,
+                operand: operand(&case.formats, &instruction.product),
+                coefficients: instruction.coefficients,
+                cycles: instruction.columns,
             };
             all.extend(instructions(case, section).into_iter().enumerate().map(listed));
         }

@@ -292,9 +292,9 @@ impl Resources {
             memories.push(memory(Holds::FirstProduct, quads, quad(f.vector_bits)));
         }
         let segmenter = f.by_contact().then(|| Segmenter::new(&scene.sensor, WIDTH));
-        if let Some(own) = &segmenter {
+        if let Some(segmenter) = &segmenter {
             memories.push(memory(Holds::Sheared, quads, quad(f.data_bits)));
-            memories.extend(segment_memories(&segmentation(scene, own), board, shallow));
+            memories.extend(segment_memories(&segmentation(scene, segmenter), board, shallow));
         }
         let searches = f.searches();
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| searches) {
@@ -308,14 +308,15 @@ impl Resources {
         let difference = f.code_bits + if running.is_some() { 2 } else { 1 };
         let calibrate = if gains { board.multipliers_for(difference, GAIN_BITS) } else { 0 };
         let square = |bits: u32| board.multipliers_for(bits, bits);
-        let squares = adaptive.as_ref().map_or(0, |own| {
-            let judged = own.judged().map(|(window, _)| square(own.apart_bits(window, f.code_bits)));
-            square(own.second_bits(f.code_bits)) + judged.sum::<usize>()
+        let squares = adaptive.as_ref().map_or(0, |adaptive| {
+            let judged = adaptive.judged().map(|(window, _)| square(adaptive.apart_bits(window, f.code_bits)));
+            square(adaptive.second_bits(f.code_bits)) + judged.sum::<usize>()
         });
         // Operands times μ, and the size of μ.
         let scale = 4 * board.multipliers_for(f.data_bits, MU_BITS);
         let of = |wanted: bool, count: usize| if wanted { count } else { 0 };
-        let segments = segmenter.as_ref().map_or(0, |own| segment_multipliers(&segmentation(scene, own), board));
+        let segments =
+            segmenter.as_ref().map_or(0, |segmenter| segment_multipliers(&segmentation(scene, segmenter), board));
         let lane = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
         let multipliers = vec![
             ("prepare", calibrate + squares),

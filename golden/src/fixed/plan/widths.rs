@@ -27,21 +27,21 @@ const REACH: u64 = 4;
 
 /// The subarrays of a case: their common matrices and their number.
 #[derive(Clone, Debug)]
-pub struct Shape {
+pub struct CaseMatrices {
     /// Matrices of one subarray.
     pub matrices: Matrices,
     /// Number of subarrays.
     pub parts: usize,
 }
 
-impl Shape {
+impl CaseMatrices {
     /// The quad layout of a subarray.
     pub fn quads(&self) -> Quads {
         Quads { rows: self.matrices.sensor.rows, cols: self.matrices.sensor.cols }
     }
 
-    /// The shape with all coefficients times `factor`.
-    pub fn scaled(mut self, factor: f64) -> Shape {
+    /// The case with all coefficients times `factor`.
+    pub fn scaled(mut self, factor: f64) -> CaseMatrices {
         for matrix in [&mut self.matrices.cz_pinv, &mut self.matrices.ax, &mut self.matrices.ay] {
             *matrix *= faer::Scale(factor);
         }
@@ -59,17 +59,22 @@ pub struct Widths {
 
 /// Quantises the matrices of a scene's cases and derives the widths of all words; `board` has the multipliers. Where
 /// there are several cases the whole array's is the first. They share the hardware: every word has the width and scale
-/// that serves all of them, and `others`, whose coefficients may be written at run time. The formats are those of the first
+/// that serves all of them, and `specimens`, whose coefficients may be written at run time. The formats are those of the first
 /// case with a lane for each row.
 ///
 /// # Errors
 /// [`FixedError::Format`] if a word needs more than the 48-bit accumulator, or a norm of A more headroom than the data
 /// word has.
-pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) -> Result<Widths, FixedError> {
+pub fn widths(
+    scene: &Scene,
+    cases: &[CaseMatrices],
+    specimens: &[CaseMatrices],
+    board: &Board,
+) -> Result<Widths, FixedError> {
     let spec = &scene.fixed;
-    let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
-    let all: &Vec<&Shape> = &shapes.iter().chain(others).collect();
-    let degree = all.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
+    let largest = cases.first().ok_or(FixedError::Internal("a scene has a case"))?;
+    let all: &Vec<&CaseMatrices> = &cases.iter().chain(specimens).collect();
+    let degree = all.iter().map(|case| case.matrices.degree).max().unwrap_or(0);
     // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
     let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits[1]);
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
@@ -83,13 +88,12 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
     // Where all subarrays are square, one matrix is used for both axes.
     let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
     let serial = board.engine == EngineKind::Serial;
-    let shared_a =
-        !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric() && composed.is_empty();
+    let shared_a = !serial && degree == 1 && square && cases.len() == 1 && flips.are_symmetric() && composed.is_empty();
 
     let input_bits = spec.input_bits + scene.input.longest_average();
     let limbs = Limbs::new(input_bits, spec.inverse_bits, operand_bits)?;
     let Limbs { fold_bits, input_low_bits, inverse_low_bits, align: limb_align, raw_shift } = limbs;
-    let counts = all.iter().map(|shape| shape.quads().len());
+    let counts = all.iter().map(|case| case.quads().len());
     let Sums { raw_bound, acc_bits, lane_bits } =
         limbs.sums(quantised.iter().zip(counts), flips.inverse.len(), data_bits)?;
     // Scales are the same in all cases.
@@ -99,7 +103,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
 
     let each = quantised.iter().zip(all);
     let growths: Vec<Vec<f64>> =
-        each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
+        each.map(|(q, case)| growth(&q.ax, &q.ay, case.quads().len(), EXPONENTS.len())).collect();
     let headroom = if composed.is_empty() { 0 } else { headroom(&growths, degree) };
     let taxels = (sensor.rows * sensor.cols) as u64;
     let shifted = shifted(&growths, degree, vector_bits);
@@ -124,7 +128,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
         quads: count,
         lanes_per_parity: count,
         groups: 1,
-        search_width: if composed.is_empty() { search_width(scene, board, degree, shapes) } else { Quads::LANES },
+        search_width: if composed.is_empty() { search_width(scene, board, degree, cases) } else { Quads::LANES },
         layers: composed.iter().map(|layer| layer.bias[0].len()).collect(),
         // The mask is that of a window.
         window_quads: composed.first().and_then(|layer| layer.mask.as_ref()).map(|mask| mask[0].ncols()),
@@ -161,7 +165,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
         let missing = FixedError::Format { what: "network", needs: formats.lane_bits + 1, has: formats.lane_bits };
         quantised[0].network = Some(network.ok_or(missing)?);
     }
-    quantised.truncate(shapes.len());
+    quantised.truncate(cases.len());
     Ok(Widths { formats, quantised })
 }
 
@@ -197,7 +201,7 @@ impl Limbs {
         Ok(Limbs { fold_bits, input_low_bits, inverse_low_bits, align, raw_shift })
     }
 
-    /// The largest sums over all cases and others, each with its number of quads; `flips` are those of Cz⁺.
+    /// The largest sums over all cases and specimens, each with its number of quads; `flips` are those of Cz⁺.
     fn sums<'a>(
         &self,
         each: impl Iterator<Item = (&'a Quantised, usize)> + Clone,
@@ -287,39 +291,39 @@ fn headroom(growths: &[Vec<f64>], steps: usize) -> u32 {
 /// Taxels that the search computes per cycle: the scene's number, else the board's. What is not searched passes on in
 /// quads; one quad alone is not worth a step for each of its taxels; where the case is chosen per frame, the values of all
 /// cases begin alike.
-fn search_width(scene: &Scene, board: &Board, degree: usize, shapes: &[Shape]) -> usize {
-    match shapes {
+fn search_width(scene: &Scene, board: &Board, degree: usize, cases: &[CaseMatrices]) -> usize {
+    match cases {
         [only] if degree > 0 && only.quads().len() > 1 => scene.hardware.search_width.unwrap_or(board.search_width),
         _ => Quads::LANES,
     }
 }
 
 /// The matrices of all cases as stored, on one scale.
-fn quantised(scene: &Scene, shapes: &[&Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
+fn quantised(scene: &Scene, cases: &[&CaseMatrices], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
     let spec = &scene.fixed;
     let scale = -4.0 / 3.0 * scene.search.mu_max;
     // A dead taxel breaks the mirror symmetry: then every flip is tried, that of the symmetry first.
     let range = &scene.hardware.table_range;
     let looked_at = if scene.input.dead.is_empty() && range.dead_taxels == 0 { 1 } else { 4 };
-    let folded = |shape: &Shape, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
+    let folded = |case: &CaseMatrices, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
         let scaled = |Flipped { flip, parity }| {
             let parity: [Vec<f64>; 4] = parity;
             Flipped { flip, parity: parity.map(|block| block.iter().map(|c| c * scale).collect()) }
         };
-        (0..looked_at).map(|other| scaled(parity_blocks(shape.quads(), matrix, own ^ other))).collect()
+        (0..looked_at).map(|other| scaled(parity_blocks(case.quads(), matrix, own ^ other))).collect()
     };
-    let inverses: Vec<_> = shapes.iter().map(|shape| folded(shape, &shape.matrices.cz_pinv, 0, 1.0)).collect();
-    let pair = |shape: &&Shape| {
-        [folded(shape, &shape.matrices.ax, FLIP_X, scale), folded(shape, &shape.matrices.ay, FLIP_Y, scale)]
+    let inverses: Vec<_> = cases.iter().map(|case| folded(case, &case.matrices.cz_pinv, 0, 1.0)).collect();
+    let pair = |case: &&CaseMatrices| {
+        [folded(case, &case.matrices.ax, FLIP_X, scale), folded(case, &case.matrices.ay, FLIP_Y, scale)]
     };
-    let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
+    let pairs: Vec<_> = cases.iter().flat_map(pair).collect();
     // What is zero here need not be so in another specimen.
     let all_flips = range.has_coefficients();
     let mut inverses = quantise(&inverses, spec.inverse_bits, all_flips).into_iter();
     let mut pairs = quantise(&pairs, coef_bits, all_flips).into_iter();
     let mut next =
         || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()?, network: None });
-    shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
+    cases.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
 }
 
 /// Bounds of ‖v_ij‖∞ / ‖v_00‖∞ from the ∞-norms of the stored A.

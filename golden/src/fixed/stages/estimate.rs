@@ -23,9 +23,9 @@ pub const REDUCTION_CYCLES: usize = 4;
 /// Right shift of a position to the amount by which it is reduced.
 pub const REDUCTION_SHIFT: u32 = 5;
 
-/// μ as the network knows it.
+/// μ from the network's last layer, in words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Estimate {
+pub struct MuWords {
     /// Position of μ in mu_max/384, [x, y].
     pub position: [i32; 2],
     /// ln of the standard deviation of μ over mu_max in 1/384, [x, y].
@@ -55,7 +55,7 @@ pub fn ln_sigma_range() -> [i64; 2] {
 }
 
 /// μ from the accumulators of the last layer; `shift` is that of the hidden layers.
-pub fn estimate(shift: u32, rows: &[[i64; 4]]) -> Estimate {
+pub fn estimate(shift: u32, rows: &[[i64; 4]]) -> MuWords {
     let mut saturations = 0;
     let mut output = |place: usize, bits: u32| {
         let (parity, row) = OUTPUTS[place];
@@ -69,7 +69,7 @@ pub fn estimate(shift: u32, rows: &[[i64; 4]]) -> Estimate {
     for _ in 0..REDUCTIONS {
         position = reduced(position);
     }
-    Estimate { position: position.map(|x| x as i32), ln_sigma, saturations }
+    MuWords { position: position.map(|x| x as i32), ln_sigma, saturations }
 }
 
 /// A position outside the disc a little closer to it.
@@ -91,7 +91,7 @@ mod tests {
         let unit = 1 << LAST_SHIFT;
         let rows = [[-800, 1000, -500, 9], [-4000, 7, 7, 7]].map(|row| row.map(|word| word * unit));
         let found = estimate(3, &rows);
-        assert_eq!(found, Estimate { position: [125, -63 + 1], ln_sigma: [-100, -500], saturations: 0 });
+        assert_eq!(found, MuWords { position: [125, -63 + 1], ln_sigma: [-100, -500], saturations: 0 });
         let far = estimate(0, &[[200 * unit, 5000 * unit, 0, 0], [-3000 * unit, 0, 0, 0]]);
         assert_eq!((far.ln_sigma, far.saturations), ([192, -2688], 1));
         assert!(far.position[0] <= MU_STEPS as i32 && far.position[0] > 370, "{far:?}");
@@ -101,7 +101,7 @@ mod tests {
         /// Any output is in the disc at the end, in its direction.
         #[test]
         fn positions_are_in_the_disc(x in -512i64..512, y in -512i64..512) {
-            let Estimate { position: [a, b], .. } = estimate(0, &[[0, x << LAST_SHIFT, y << LAST_SHIFT, 0], [0; 4]]);
+            let MuWords { position: [a, b], .. } = estimate(0, &[[0, x << LAST_SHIFT, y << LAST_SHIFT, 0], [0; 4]]);
             let (a, b) = (i64::from(a), i64::from(b));
             prop_assert!(a * a + b * b <= MU_STEPS * MU_STEPS);
             prop_assert!((a * y - b * x).abs() <= 40 * (x.abs() + y.abs()));

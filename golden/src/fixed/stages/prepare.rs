@@ -112,17 +112,23 @@ impl Scale {
     /// What is wrong with a file; [`FixedError::TableRange`].
     pub fn new(scene: &Scene) -> Result<Scale, FixedError> {
         let files = |array: usize| {
-            let own = scene.of_array(array);
-            let table = own.input.calibration.as_ref().map(|path| Calibration::load(path, &own.sensor)).transpose();
-            let tare = own.input.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, &own)?.zero));
+            let array_scene = scene.of_array(array);
+            let table = array_scene
+                .input
+                .calibration
+                .as_ref()
+                .map(|path| Calibration::load(path, &array_scene.sensor))
+                .transpose();
+            let tare =
+                array_scene.input.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, &array_scene)?.zero));
             Ok::<_, FixedError>((table.map_err(InputError::from)?, tare.transpose()?))
         };
         let (mut table, mut tare) = files(0)?;
         for array in 1..scene.hardware.arrays {
-            let (own, zero) = files(array)?;
-            if let (Some(table), Some(own)) = (&mut table, own) {
-                table.offset.extend(own.offset);
-                table.gain.extend(own.gain);
+            let (of_array, zero) = files(array)?;
+            if let (Some(table), Some(of_array)) = (&mut table, of_array) {
+                table.offset.extend(of_array.offset);
+                table.gain.extend(of_array.gain);
             }
             tare.iter_mut().zip(zero).for_each(|(tare, zero)| tare.extend(zero));
         }

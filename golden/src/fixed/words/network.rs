@@ -79,18 +79,18 @@ impl WordNetwork {
             let scale = outputs_per_unit * 2f64.powi(own_shift as i32);
             let word = |value: f64, per_unit: f64| (value * scale / per_unit).round() as i64;
             let (outputs, inputs) = (layer.bias[0].len(), layer.weights[0].ncols());
-            let block = |own: &Mat<f64>, per_unit: f64| -> Vec<i64> {
-                let cols = own.ncols();
-                (0..outputs * cols).map(|k| word(own[(k / cols, k % cols)], per_unit)).collect()
+            let block = |matrix: &Mat<f64>, per_unit: f64| -> Vec<i64> {
+                let cols = matrix.ncols();
+                (0..outputs * cols).map(|k| word(matrix[(k / cols, k % cols)], per_unit)).collect()
             };
             let weights = |parity: usize| block(&layer.weights[parity], inputs_per_unit);
             // The transform is twice the orthonormal one.
-            let mask = |own: &[Mat<f64>; 4]| Flipped {
+            let mask = |masks: &[Mat<f64>; 4]| Flipped {
                 flip: 0,
-                parity: std::array::from_fn(|parity| block(&own[parity], 2.0 * MASKED as f64)),
+                parity: std::array::from_fn(|parity| block(&masks[parity], 2.0 * MASKED as f64)),
             };
             let bias = |parity: usize| layer.bias[parity].iter().map(|&bias| word(bias, ONE as f64)).collect();
-            let own = WordLayer {
+            let layer = WordLayer {
                 outputs,
                 inputs,
                 weights: Flipped { flip: 0, parity: std::array::from_fn(weights) },
@@ -99,7 +99,7 @@ impl WordNetwork {
             };
             // Half the transform of images that are twice as large.
             inputs_per_unit = 4.0 * outputs_per_unit;
-            own
+            layer
         };
         WordNetwork { layers: layers.iter().enumerate().map(words).collect(), shift }
     }

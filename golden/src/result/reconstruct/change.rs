@@ -13,8 +13,8 @@ use crate::spec::scene::Scene;
 pub(crate) struct ForceChange {
     /// The change in N, [x, y, normal].
     pub force_N: [f64; 3],
-    /// Its standard deviation in N, [x, y, normal].
-    pub sigma_N: [f64; 3],
+    /// The change of its variance in N², [x, y, normal]; below 0 where more is known of the changed force.
+    pub variance_N2: [f64; 3],
     /// Share of each taxel in it, row-major over the array; their sum is 1.
     pub shares: Vec<f64>,
 }
@@ -23,24 +23,25 @@ impl Reconstruction {
     /// Changes the forces, those of each contact by its own, in the order of [`Reconstruction::contacts`]; where no contacts are told
     /// apart there is one change, of the array as one subarray. `frame` has the known forces.
     pub(crate) fn change(&mut self, scene: &Scene, frame: &Frame, changes: &[ForceChange]) {
-        for own in changes {
+        for change in changes {
             let forces = &mut self.forces_N;
-            for (axis, change_N) in [&mut forces.fx, &mut forces.fy, &mut forces.fz].into_iter().zip(own.force_N) {
-                axis.iter_mut().zip(&own.shares).for_each(|(force, share)| *force += share * change_N);
+            for (axis, change_N) in [&mut forces.fx, &mut forces.fy, &mut forces.fz].into_iter().zip(change.force_N) {
+                axis.iter_mut().zip(&change.shares).for_each(|(force, share)| *force += share * change_N);
             }
         }
-        for (contact, own) in self.extra.contacts.iter_mut().flatten().zip(changes) {
-            contact.force_N = sum(contact.force_N, own.force_N);
-            contact.sigma_N = std::array::from_fn(|axis| contact.sigma_N[axis].hypot(own.sigma_N[axis]));
+        for (contact, change) in self.extra.contacts.iter_mut().flatten().zip(changes) {
+            contact.force_N = sum(contact.force_N, change.force_N);
+            contact.sigma_N = std::array::from_fn(|axis| changed(contact.sigma_N[axis], change.variance_N2[axis]));
             contact.mu = ratio(contact.force_N);
             for (axis, covariance) in [(0, 0), (1, 2)] {
-                contact.mu_covariance[covariance] += (own.sigma_N[axis] / contact.force_N[2]).powi(2);
+                let variance = &mut contact.mu_covariance[covariance];
+                *variance = (*variance + change.variance_N2[axis] / contact.force_N[2].powi(2)).max(0.0);
             }
         }
-        for (region, own) in self.extra.regions.iter_mut().flatten().zip(changes) {
-            region.load_N = sum(region.load_N, own.force_N);
+        for (region, change) in self.extra.regions.iter_mut().flatten().zip(changes) {
+            region.load_N = sum(region.load_N, change.force_N);
             region.mu = ratio(region.load_N);
-            region.shear_sigma_N = wider(region.shear_sigma_N, own.sigma_N);
+            region.shear_sigma_N = all_changed(region.shear_sigma_N, change.variance_N2);
             region.mu_sigma = region.shear_sigma_N.map(|sigma| sigma.map(|sigma| sigma / region.load_N[2].abs()));
             let centre = Resultant::of(&scene.sensor, &self.forces_N, region.taxels.iter().copied());
             region.centre_mm = centre.centre_mm;
@@ -50,8 +51,8 @@ impl Reconstruction {
         self.error = frame.resultant_N.map(|truth| Errors::new(truth, self.resultant_N));
         if let [whole] = self.subarrays.as_mut_slice() {
             whole.mu = ratio(self.resultant_N);
-            if let ([own], true) = (changes, whole.shear_sigma_N.is_some()) {
-                whole.shear_sigma_N = wider(whole.shear_sigma_N, own.sigma_N);
+            if let ([change], true) = (changes, whole.shear_sigma_N.is_some()) {
+                whole.shear_sigma_N = all_changed(whole.shear_sigma_N, change.variance_N2);
                 whole.mu_sigma = whole.shear_sigma_N.map(|sigma| sigma.map(|sigma| sigma / self.resultant_N[2].abs()));
             }
         }
@@ -86,7 +87,12 @@ fn ratio([x, y, normal]: [f64; 3]) -> [f64; 2] {
     }
 }
 
-/// Standard deviations of the shear with that of a change.
-fn wider(sigma_N: Option<[f64; 2]>, change_N: [f64; 3]) -> Option<[f64; 2]> {
-    sigma_N.map(|sigma| std::array::from_fn(|axis| sigma[axis].hypot(change_N[axis])))
+/// The standard deviation whose variance has changed.
+fn changed(sigma_N: f64, variance_N2: f64) -> f64 {
+    (sigma_N * sigma_N + variance_N2).max(0.0).sqrt()
+}
+
+/// Standard deviations of the shear whose variances have changed.
+fn all_changed(sigma_N: Option<[f64; 2]>, variance_N2: [f64; 3]) -> Option<[f64; 2]> {
+    sigma_N.map(|sigma| std::array::from_fn(|axis| changed(sigma[axis], variance_N2[axis])))
 }

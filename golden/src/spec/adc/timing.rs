@@ -138,18 +138,18 @@ mod tests {
 
     #[test]
     fn what_is_impossible_says_what_it_takes() {
-        let told = |change: fn(&mut AdcScan), clock_MHz: f64| {
+        let message = |change: fn(&mut AdcScan), clock_MHz: f64| {
             let mut scan = mat();
             change(&mut scan);
             Timing::new(&scan, 8, clock_MHz).unwrap_err().to_string()
         };
-        let text = told(|scan| scan.sclk_MHz = 20.0, 100.0);
+        let text = message(|scan| scan.sclk_MHz = 20.0, 100.0);
         assert_eq!(text, "hardware.adc_scan.sclk_MHz = 20 is not possible; it must be at most 16: max11125 at 100 MHz");
-        assert!(told(|scan| scan.sclk_MHz = 12.5, 24.0).contains("at most 6: max11125 at 24 MHz"));
-        let text = told(|scan| scan.period_us = 100.0, 100.0);
+        assert!(message(|scan| scan.sclk_MHz = 12.5, 24.0).contains("at most 6: max11125 at 24 MHz"));
+        let text = message(|scan| scan.period_us = 100.0, 100.0);
         assert!(text.contains("period_us = 100") && text.contains("at least 476.7: 47670 cycles"), "{text}");
-        assert!(told(|scan| scan.period_us = 1e9, 100.0).contains("at most 10737418.24"));
-        assert!(told(|scan| scan.sclk_MHz = 1e-12, 100.0).contains("at least 0.0000000931"));
+        assert!(message(|scan| scan.period_us = 1e9, 100.0).contains("at most 10737418.24"));
+        assert!(message(|scan| scan.sclk_MHz = 1e-12, 100.0).contains("at least 0.0000000931"));
         let mut least = mat();
         least.period_us = 476.7;
         assert_eq!(Timing::new(&least, 8, 100.0).unwrap().period, 47_670);

@@ -133,14 +133,14 @@ fn an_unknown_board_lists_the_known_ones() {
 #[test]
 fn the_fields_are_those_of_a_board() {
     let table: Table = [("x".to_owned(), Value::Integer(1))].into_iter().collect();
-    let told = Board::deserialize(Value::Table(table)).unwrap_err().to_string();
+    let message = Board::deserialize(Value::Table(table)).unwrap_err().to_string();
     let fields: Vec<_> = reader::FIELDS.iter().map(|(field, _)| format!("`{field}`")).collect();
-    assert!(told.contains(&format!("expected one of {}\n", fields.join(", "))), "{told}");
+    assert!(message.contains(&format!("expected one of {}\n", fields.join(", "))), "{message}");
 }
 
 #[test]
 fn a_wrong_field_is_told_with_its_line_value_and_what_is_right() {
-    let not = |line: usize, told: &str| format!("own.toml, line {line}: {told}");
+    let not = |line: usize, message: &str| format!("own.toml, line {line}: {message}");
     let file = |from: &str, to: &str| own(&OWN.replace(from, to)).unwrap_err();
     let with = |more: &str| own(&format!("{OWN}{more}\n")).unwrap_err();
     let of_device = |field: &str| format!("own.toml: {field} is missing; it must be ");
@@ -195,15 +195,15 @@ fn a_wrong_field_is_told_with_its_line_value_and_what_is_right() {
         (with("uart_baud = 0"), not(6, "uart_baud = 0 is not allowed; it must be ")),
         (with("spi_MHz = -1.0"), not(6, "spi_MHz = -1.0 is not allowed; it must be a number above 0")),
     ];
-    for (told, wanted) in cases {
-        assert!(told.starts_with(&wanted), "{told}\n{wanted}");
+    for (message, wanted) in cases {
+        assert!(message.starts_with(&wanted), "{message}\n{wanted}");
     }
     // Every field can be wrong, and is told with its line.
     for (field, allowed) in reader::FIELDS {
         let own_lines: Vec<&str> = OWN.lines().filter(|line| !line.starts_with(&format!("{field} "))).collect();
         let text = format!("{field} = true\n{}\n", own_lines.join("\n"));
-        let told = own(&text).unwrap_err();
-        assert!(told.starts_with(&not(1, &format!("{field} = true is not allowed; it must be "))), "{told}");
+        let message = own(&text).unwrap_err();
+        assert!(message.starts_with(&not(1, &format!("{field} = true is not allowed; it must be "))), "{message}");
         assert!(!allowed.is_empty());
     }
 }

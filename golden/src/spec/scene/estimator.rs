@@ -16,7 +16,7 @@ pub enum EstimatorKind {
     Search,
     /// The μ that makes the stress most probable.
     Evidence,
-    /// The μ of a trained network, and p(μ) as the search has it.
+    /// μ from a trained network; p from the series at that μ. This is what the hardware computes with a network.
     Network,
     /// The μ of a trained network, and the forces that are most probable at that μ.
     EvidenceNetwork,

@@ -475,14 +475,14 @@ impl Scene {
     /// The input option, if any, that needs `input.full_scale_MPa` in hardware because its words are relative to it.
     pub(crate) fn scaled_input(&self) -> Option<&'static str> {
         let input = &self.input;
-        let asked = [
+        let options = [
             ("input.calibration", input.calibration.is_some()),
             ("input.tare", input.tare.is_some()),
             ("hardware.tables", self.hardware.has_writable_tables()),
             ("hardware.source", self.hardware.adc_scan.is_some()),
             ("input.zero", self.input.running_zero().is_some()),
         ];
-        asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
+        options.into_iter().find(|(_, set)| *set).map(|(field, _)| field)
     }
 
     /// The value of that option, for messages.

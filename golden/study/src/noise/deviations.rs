@@ -14,7 +14,7 @@ use super::statistic::quantile;
 use super::StudyError;
 use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, DrawnFrame};
 use dermis_golden::engine::Engine;
 use dermis_golden::estimate::deviations::{Deviations, Load, Subject, MOST_PUSH};
 use dermis_golden::estimate::float::Golden;
@@ -154,7 +154,7 @@ fn errors(
     seed: u64,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Vec<Error>>, StudyError> {
-    let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+    let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
     let ratio = RATIO.map(|share| share * scene.search.mu_max);
     let options = DrawOptions { shapes, ratio, seed, ..Default::default() };
     let study = ShapeStudy { levels: levels.to_vec(), draws, options, ..Default::default() };

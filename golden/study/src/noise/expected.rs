@@ -67,10 +67,10 @@ impl StatedNoise {
 ///
 /// let mut scene = Scene::builtin("eight-by-eight")?;
 /// scene.search.noise_floor_MPa = Some(1e-4);
-/// let asked = Expectation { peak_MPa: Some(0.2), draws: 4, seed: 1, with_hardware: true };
-/// let noise = StatedNoise::of(&scene, asked.peak_MPa)?;
+/// let expectation = Expectation { peak_MPa: Some(0.2), draws: 4, seed: 1, with_hardware: true };
+/// let noise = StatedNoise::of(&scene, expectation.peak_MPa)?;
 /// assert_eq!(noise.share(), Some(5e-4));
-/// let rows = expected(&scene, &asked, &noise, &|_, _| ())?;
+/// let rows = expected(&scene, &expectation, &noise, &|_, _| ())?;
 /// assert_eq!(rows.len(), 3);
 /// assert!(rows.iter().all(|row| row.noise == 5e-4));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -80,11 +80,11 @@ impl StatedNoise {
 /// As [`shape_study`].
 pub fn expected(
     scene: &Scene,
-    asked: &Expectation,
+    expectation: &Expectation,
     noise: &StatedNoise,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ShapeRow>, StudyError> {
-    let (bare, study) = drawn(scene, asked, noise);
+    let (bare, study) = drawn(scene, expectation, noise);
     shape_study(&bare, &study, progress)
 }
 
@@ -94,17 +94,17 @@ pub fn expected(
 /// As [`other_medium`].
 pub fn of_other_medium(
     scene: &Scene,
-    asked: &Expectation,
+    expectation: &Expectation,
     noise: &StatedNoise,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<SensitivityRow>, StudyError> {
-    let (bare, mut study) = drawn(scene, asked, noise);
+    let (bare, mut study) = drawn(scene, expectation, noise);
     study.levels.truncate(1);
     other_medium(&bare, &study, progress)
 }
 
 /// The scene as far as it matters to frames of stress, and what is drawn for it.
-fn drawn(scene: &Scene, asked: &Expectation, noise: &StatedNoise) -> (Scene, ShapeStudy) {
+fn drawn(scene: &Scene, expectation: &Expectation, noise: &StatedNoise) -> (Scene, ShapeStudy) {
     let mut bare = scene.clone().with_chosen_hardware();
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.hardware.take_stress();
@@ -112,18 +112,19 @@ fn drawn(scene: &Scene, asked: &Expectation, noise: &StatedNoise) -> (Scene, Sha
     bare.search.noise_floor_MPa = Some(0.0);
     bare.threshold = ThresholdSpec::default();
     let converter = Converter { gain_spread, unipolar, ..Converter::default() };
-    let mut options = DrawOptions { seed: asked.seed, converter, ..DrawOptions::default() };
+    let mut options = DrawOptions { seed: expectation.seed, converter, ..DrawOptions::default() };
     let SearchSpec { mu_max, .. } = scene.search;
     if mu_max > 0.0 {
         options.ratio = options.ratio.map(|ratio| ratio * mu_max / SearchSpec::default().mu_max);
     }
     let mut candidates = vec![Candidate::Scene];
-    candidates.extend(asked.with_hardware.then_some(Candidate::Hardware));
+    candidates.extend(expectation.with_hardware.then_some(Candidate::Hardware));
     let share = noise.share();
     let levels = share.map_or_else(|| ShapeStudy::default().levels, |share| vec![share]);
-    // A scene without a stated noise is not told it: the golden model finds it in the frame.
-    let told = share.is_some();
-    let study = ShapeStudy { levels, draws: asked.draws, options, told, candidates, ..ShapeStudy::default() };
+    // Where the scene states no noise, the golden model finds it in the frame.
+    let noise_stated = share.is_some();
+    let study =
+        ShapeStudy { levels, draws: expectation.draws, options, noise_stated, candidates, ..ShapeStudy::default() };
     (bare, study)
 }
 
@@ -131,13 +132,13 @@ fn drawn(scene: &Scene, asked: &Expectation, noise: &StatedNoise) -> (Scene, Sha
 mod tests {
     use super::*;
 
-    fn asked(peak_MPa: Option<f64>) -> Expectation {
+    fn expectation(peak_MPa: Option<f64>) -> Expectation {
         Expectation { peak_MPa, draws: 6, seed: 3, with_hardware: true }
     }
 
     fn rows(scene: &Scene, peak_MPa: Option<f64>) -> Vec<ShapeRow> {
         let noise = StatedNoise::of(scene, peak_MPa).unwrap();
-        expected(scene, &asked(peak_MPa), &noise, &|_, _| ()).unwrap()
+        expected(scene, &expectation(peak_MPa), &noise, &|_, _| ()).unwrap()
     }
 
     #[test]
@@ -171,7 +172,7 @@ mod tests {
             let mut scene = Scene::builtin(name).unwrap();
             scene.search.noise_floor_MPa = Some(1e-6);
             let noise = StatedNoise::of(&scene, Some(0.1)).unwrap();
-            let wrong = of_other_medium(&scene, &asked(Some(0.1)), &noise, &|_, _| ()).unwrap();
+            let wrong = of_other_medium(&scene, &expectation(Some(0.1)), &noise, &|_, _| ()).unwrap();
             let right = rows(&scene, Some(0.1));
             assert_eq!((wrong.len(), right.len()), (2, 3));
             for (wrong, right) in wrong.iter().zip(&right[1..]) {
@@ -188,6 +189,6 @@ mod tests {
         scene.threshold.min_force_N = 0.01;
         let rows = rows(&scene, None);
         assert_eq!(rows.len(), 3 * ShapeStudy::default().levels.len());
-        assert!(rows.iter().all(|row| !row.told));
+        assert!(rows.iter().all(|row| !row.noise_stated));
     }
 }

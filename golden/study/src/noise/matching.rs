@@ -47,12 +47,12 @@ pub fn partners(found: &[FoundContact], truth: &[ContactTruth]) -> Vec<Option<Fo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::data::generator::draws::Shape;
+    use dermis_golden::data::generator::draws::ContactShape;
 
     #[test]
     fn the_nearest_pair_comes_first() {
         let truth = [[0.0, 0.0], [10.0, 0.0], [0.0, 30.0]].map(|centre_mm| ContactTruth {
-            shape: Shape::Ring,
+            shape: ContactShape::Ring,
             centre_mm,
             force_N: [0.0; 3],
         });

@@ -3,7 +3,7 @@
 use super::*;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Draws, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, Draws};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::estimate::learned::{with_network, Learned, Training};
 use dermis_golden::estimate::misfit::Misfit;
@@ -13,7 +13,7 @@ use dermis_golden::spec::scene::{EstimatorKind, ForceOutput, Scene};
 
 /// A frame like the training of a network for `scene`, with 0.5 % of noise.
 fn like(scene: &Scene, contacts: usize, number: u64) -> Frame {
-    let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+    let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
     let converter = Converter { noise: 5e-3, unipolar: scene.input.unipolar, ..Default::default() };
     let options = DrawOptions { shapes, contacts, converter, seed: 31, ..Default::default() };
     let frame = Draws::new(scene, options).unwrap().frame(number).unwrap().frame;

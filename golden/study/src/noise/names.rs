@@ -1,6 +1,6 @@
 //! Names: values by their names in scene files and on the command line.
 
-use dermis_golden::data::generator::draws::Shape;
+use dermis_golden::data::generator::draws::ContactShape;
 
 /// The value with a name.
 ///
@@ -15,12 +15,13 @@ pub fn by_name<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
 ///
 /// # Errors
 /// An unknown name, with all that are known.
-pub fn shapes_named(text: &str) -> Result<Vec<Shape>, String> {
+pub fn shapes_named(text: &str) -> Result<Vec<ContactShape>, String> {
     match text {
-        "all" | "mixed" => Ok(Shape::NAMES.map(|(_, shape)| shape).to_vec()),
-        "table" => Ok(Shape::TABLE.to_vec()),
+        "all" | "mixed" => Ok(ContactShape::NAMES.map(|(_, shape)| shape).to_vec()),
+        "table" => Ok(ContactShape::TABLE.to_vec()),
         list => {
-            let shape = |name: &str| by_name(name, &Shape::NAMES).map_err(|known| format!("{name:?}: one of {known}"));
+            let shape =
+                |name: &str| by_name(name, &ContactShape::NAMES).map_err(|known| format!("{name:?}: one of {known}"));
             list.split(',').map(|name| shape(name.trim())).collect()
         }
     }

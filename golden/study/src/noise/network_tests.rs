@@ -86,7 +86,8 @@ fn standard_deviations_of_regions_are_honest() {
     let training = Training { steps: 1200, batch: 48, contacts: 400, hidden: vec![32, 16], ..Default::default() };
     let (scene, _file) = with_network(Scene::parse(text, "two").unwrap(), &training).unwrap();
     let options = DrawOptions { contacts: 2, ..Default::default() };
-    let wanted = ShapeStudy { levels: vec![0.0005, 0.002], draws: 100, options, told: false, ..Default::default() };
+    let wanted =
+        ShapeStudy { levels: vec![0.0005, 0.002], draws: 100, options, noise_stated: false, ..Default::default() };
     for row in shape_study(&scene, &wanted, &|_, _| ()).unwrap().iter().filter(|row| row.estimator != "none") {
         let coverage = row.summary.coverage.unwrap();
         assert!((0.55..0.8).contains(&coverage.within_1.value), "{}: {coverage:?}", row.noise);
@@ -106,7 +107,7 @@ fn errors_are_expected_of_writable_hardware_too() {
     let path = folder.path().join("table.csv");
     std::fs::write(&path, table.to_csv(&scene.sensor)).unwrap();
     scene.input.calibration = Some(path);
-    let asked = Expectation { peak_MPa: None, draws: 2, seed: 1, with_hardware: true };
+    let expectation = Expectation { peak_MPa: None, draws: 2, seed: 1, with_hardware: true };
     let noise = StatedNoise::of(&scene, None).unwrap();
-    assert!(expected(&scene, &asked, &noise, &|_, _| ()).is_ok());
+    assert!(expected(&scene, &expectation, &noise, &|_, _| ()).is_ok());
 }

@@ -3,7 +3,7 @@
 use super::coverage::{Coverage, Deviation};
 use super::matching::{found, partners};
 use super::statistic::{ErrorSpread, Interval};
-use dermis_golden::data::generator::draws::{DrawnFrame, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawnFrame};
 use dermis_golden::result::errors::Errors;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::sensor::Sensor;
@@ -13,7 +13,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Shape of the first contact.
-    pub shape: Shape,
+    pub shape: ContactShape,
     /// e_t of the resultant.
     pub tangential: Option<f64>,
     /// e_n of the resultant.
@@ -69,8 +69,8 @@ impl Outcome {
             outcome.contact_tangential.extend(Errors::new(truth.force_N, force_N).tangential);
             let Some(found) = partner else { continue };
             // The deviations of the array are not those of one of several contacts.
-            let told = result.contacts().is_some() || drawn.truth.len() == 1;
-            if let Some([x, y]) = found.shear_sigma_N.filter(|_| told) {
+            let is_of_contact = result.contacts().is_some() || drawn.truth.len() == 1;
+            if let Some([x, y]) = found.shear_sigma_N.filter(|_| is_of_contact) {
                 let off = |axis: usize, sigma: f64| (force_N[axis] - truth.force_N[axis]).abs() / sigma;
                 let normal = found.normal_sigma_N.map(|sigma| off(2, sigma));
                 outcome.deviations.push(Deviation { shear: [off(0, x), off(1, y)], normal });

@@ -186,28 +186,28 @@ pub fn press_study(
     for &noise in &study.levels {
         let drawn = draw(scene, study, noise)?;
         let bounds = study.motions.iter().map(|motion| {
-            let own: Vec<&Drawn> = drawn.iter().filter(|own| own.motion == *motion).collect();
-            bound(scene, &own, study.press.draw.converter.gain_spread)
+            let presses: Vec<&Drawn> = drawn.iter().filter(|press| press.motion == *motion).collect();
+            bound(scene, &presses, study.press.draw.converter.gain_spread)
         });
         let bounds = bounds.collect::<Result<Vec<_>, _>>()?;
-        for (&own, &mean) in study.engines.iter().flat_map(|own| study.means.iter().map(move |mean| (own, mean))) {
+        for (&kind, &mean) in study.engines.iter().flat_map(|kind| study.means.iter().map(move |mean| (kind, mean))) {
             let mut stated = mean.stated(scene);
-            stated.input.template &= own != PressEngine::Fixed;
-            let engine: Box<dyn Engine + Send + Sync> = match own {
-                PressEngine::Golden(kind) => Box::new(Golden::with(&stated, kind)?),
+            stated.input.template &= kind != PressEngine::Fixed;
+            let engine: Box<dyn Engine + Send + Sync> = match kind {
+                PressEngine::Golden(estimator) => Box::new(Golden::with(&stated, estimator)?),
                 PressEngine::Fixed => Box::new(Model::for_frames(&stated, &largest(&drawn))?),
             };
-            let follow = |own: &Drawn| -> Result<Followed, StudyError> {
-                let followed = follow(&*engine, own, study.press.rate_Hz)?;
+            let follow = |press: &Drawn| -> Result<Followed, StudyError> {
+                let followed = follow(&*engine, press, study.press.rate_Hz)?;
                 step();
                 Ok(followed)
             };
             let all = drawn.par_iter().map(follow).collect::<Result<Vec<Followed>, _>>()?;
-            let estimator = match own {
-                PressEngine::Golden(kind) => kind.name().to_string(),
+            let estimator = match kind {
+                PressEngine::Golden(estimator) => estimator.name().to_string(),
                 PressEngine::Fixed => "hardware".to_string(),
             };
-            let row = |motion: &'static str, own: &[&Followed], bound| {
+            let row = |motion: &'static str, followed: &[&Followed], bound| {
                 let named = PressRow {
                     noise,
                     estimator: estimator.clone(),
@@ -216,11 +216,11 @@ pub fn press_study(
                     bound,
                     ..Default::default()
                 };
-                named.with_figures(own)
+                named.with_figures(followed)
             };
             for (motion, bound) in std::iter::zip(&study.motions, &bounds) {
                 let of_motion = drawn.iter().zip(&all).filter(|(drawn, _)| drawn.motion == *motion);
-                rows.push(row(motion.name(), &of_motion.map(|(_, own)| own).collect::<Vec<_>>(), *bound));
+                rows.push(row(motion.name(), &of_motion.map(|(_, followed)| followed).collect::<Vec<_>>(), *bound));
             }
             if study.motions.len() > 1 {
                 rows.push(row("all", &all.iter().collect::<Vec<_>>(), None));
@@ -286,9 +286,9 @@ fn follow(engine: &dyn Engine, drawn: &Drawn, rate_Hz: f64) -> Result<Followed, 
 fn lag(found: &[[f64; 2]], truth: &[[f64; 2]], from: usize) -> Option<f64> {
     let begin = from.max(LONGEST_LAG);
     let count = truth.len().checked_sub(begin).filter(|count| *count > 1)? as f64;
-    let mean = [0, 1].map(|axis| truth[begin..].iter().map(|own| own[axis]).sum::<f64>() / count);
-    let away = |own: &[f64; 2], from: &[f64; 2]| (own[0] - from[0]).powi(2) + (own[1] - from[1]).powi(2);
-    let sum = |from: &[f64; 2]| truth[begin..].iter().map(|own| away(own, from)).sum::<f64>();
+    let mean = [0, 1].map(|axis| truth[begin..].iter().map(|force| force[axis]).sum::<f64>() / count);
+    let away = |force: &[f64; 2], from: &[f64; 2]| (force[0] - from[0]).powi(2) + (force[1] - from[1]).powi(2);
+    let sum = |from: &[f64; 2]| truth[begin..].iter().map(|force| away(force, from)).sum::<f64>();
     let changes = sum(&mean) > LEAST_CHANGE.powi(2) * sum(&[0.0; 2]);
     let apart = |shift: usize| (begin..truth.len()).map(|k| away(&found[k], &truth[k - shift])).sum::<f64>();
     let all: Vec<f64> = (0..=LONGEST_LAG).map(apart).collect();
@@ -301,13 +301,13 @@ fn bound(scene: &Scene, drawn: &[&Drawn], gain_spread: f64) -> Result<Option<[f6
     let kernels = Kernels::new(&scene.sensor, scene.medium);
     let mut errors = [Vec::new(), Vec::new()];
     let mut random = Random::new(1);
-    for own in drawn {
-        let middle = &own.frames[own.frames.len() / 2];
+    for press in drawn {
+        let middle = &press.frames[press.frames.len() / 2];
         let truth = middle.resultant_N.unwrap_or_default();
         let bound =
             SupportBound::new(&kernels, scene.sensor.thickness_mm, &middle.contacts, middle.stress_MPa.clone())?;
         for (errors, frames) in errors.iter_mut().zip([1.0, LONGEST_MEAN]) {
-            let noise_MPa = own.noise_MPa / f64::sqrt(frames);
+            let noise_MPa = press.noise_MPa / f64::sqrt(frames);
             let reading = Reading { noise_MPa, gain_spread, unipolar: scene.input.unipolar };
             let Some(covariance) = bound.covariance(reading) else { return Ok(None) };
             let shear = nalgebra::Matrix2::from_fn(|i, k| covariance[(i, k)]);
@@ -325,25 +325,25 @@ fn bound(scene: &Scene, drawn: &[&Drawn], gain_spread: f64) -> Result<Option<[f6
 
 impl PressRow {
     /// The row with the figures of some presses.
-    fn with_figures(self, all: &[&Followed]) -> PressRow {
+    fn with_figures(self, presses: &[&Followed]) -> PressRow {
         let sorted = |values: &mut dyn Iterator<Item = f64>| {
             let mut values: Vec<f64> = values.collect();
             values.sort_by(f64::total_cmp);
             values
         };
         let share = |of: &dyn Fn(&Followed) -> &Vec<bool>| {
-            let count = all.iter().map(|own| of(own).len()).sum::<usize>();
-            let trues = all.iter().flat_map(|own| of(own)).filter(|own| **own).count();
+            let count = presses.iter().map(|press| of(press).len()).sum::<usize>();
+            let trues = presses.iter().flat_map(|press| of(press)).filter(|is_true| **is_true).count();
             (count > 0).then(|| trues as f64 / count as f64)
         };
-        let errors = sorted(&mut all.iter().flat_map(|own| own.errors.iter().copied()));
-        let lags = sorted(&mut all.iter().filter_map(|own| own.lag_frames));
+        let errors = sorted(&mut presses.iter().flat_map(|press| press.errors.iter().copied()));
+        let lags = sorted(&mut presses.iter().filter_map(|press| press.lag_frames));
         PressRow {
             frames: errors.len(),
             tangential: [0.5, 0.9].map(|share| quantile(&errors, share)),
             lag_frames: (!lags.is_empty()).then(|| quantile(&lags, 0.5)),
-            held: share(&|own| &own.held),
-            within_1: share(&|own| &own.within),
+            held: share(&|press| &press.held),
+            within_1: share(&|press| &press.within),
             ..self
         }
     }

@@ -113,7 +113,7 @@ fn measured(
         }
         let drawn = known.iter().find(|(other, _)| *other == medium).map_or(&[][..], |(_, drawn)| drawn);
         let mut converter = study.converter(0);
-        let own = stated(&setting.stated, &converter, study.told);
+        let own = stated(&setting.stated, &converter, study.noise_stated);
         converter.gain_spread = converter.gain_spread.hypot(setting.gain_spread);
         let readings = readings(drawn, &converter, &own)?;
         for &candidate in &study.candidates {

@@ -17,7 +17,7 @@ use super::StudyError;
 use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, DrawnFrame, Draws, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, DrawnFrame, Draws};
 use dermis_golden::data::generator::support::Kernels;
 use dermis_golden::estimate::deviations::Deviations;
 use dermis_golden::estimate::float::Golden;
@@ -58,7 +58,7 @@ pub struct ShapeStudy {
     /// Shapes, contacts, seed and sensor; each level replaces the sensor's noise.
     pub options: DrawOptions,
     /// Whether the scene states noise and gain spread.
-    pub told: bool,
+    pub noise_stated: bool,
     /// The estimators.
     pub candidates: Vec<Candidate>,
     /// Whether there is also a row for each shape.
@@ -71,7 +71,7 @@ impl Default for ShapeStudy {
             levels: vec![0.0, 1e-4, 5e-4, 2e-3, 1e-2],
             draws: 200,
             options: DrawOptions::default(),
-            told: true,
+            noise_stated: true,
             candidates: vec![Candidate::Scene],
             by_shape: false,
         }
@@ -101,7 +101,8 @@ pub struct ShapeRow {
     /// Whether tension reads as zero.
     pub unipolar: bool,
     /// Whether the scene states noise and gain spread.
-    pub told: bool,
+    #[serde(rename = "told")]
+    pub noise_stated: bool,
     /// Number of contacts of a frame.
     pub contacts: usize,
     /// The shape, or `all`.
@@ -199,11 +200,11 @@ fn deviation(converter: &Converter) -> f64 {
     (noise * (1.0 / frames as f64 + tare).sqrt()).hypot(drift)
 }
 
-/// The scene as the study states it: unipolar as the sensor, noise and gains if they are told.
-pub(super) fn stated(scene: &Scene, converter: &Converter, told: bool) -> Scene {
+/// The scene as the study states it: unipolar as the sensor, noise and gains with `noise_stated`.
+pub(super) fn stated(scene: &Scene, converter: &Converter, noise_stated: bool) -> Scene {
     let mut scene = scene.clone();
     scene.input.unipolar = converter.unipolar;
-    if told {
+    if noise_stated {
         scene.search.noise_floor_MPa = Some(deviation(converter) * PEAK / scene.input.noise_share());
         scene.input.gain_spread = converter.gain_spread;
     }
@@ -268,7 +269,7 @@ pub fn shape_study(
     let mut rows = Vec::new();
     for (level, &noise) in study.levels.iter().enumerate() {
         let converter = study.converter(level);
-        let stated = stated(scene, &converter, study.told);
+        let stated = stated(scene, &converter, study.noise_stated);
         let readings = readings(&drawn, &converter, &stated)?;
         let reading = Reading {
             noise_MPa: deviation(&converter) * PEAK,
@@ -297,9 +298,9 @@ pub fn shape_study(
                     frames: converter.frames,
                     gain_spread: converter.gain_spread,
                     unipolar: converter.unipolar,
-                    told: study.told,
+                    noise_stated: study.noise_stated,
                     contacts: study.options.contacts,
-                    shape: shape.map_or("all", Shape::name),
+                    shape: shape.map_or("all", ContactShape::name),
                     estimator: estimator.clone(),
                     summary: Summary::of(&own.iter().map(|&k| &outcomes[k]).collect::<Vec<_>>()),
                     bound: BoundSpread::of(&own.iter().map(|&k| bound_errors[k].as_slice()).collect::<Vec<_>>()),
@@ -311,7 +312,7 @@ pub fn shape_study(
 }
 
 /// All shapes together, then each of them if wanted.
-fn groups(study: &ShapeStudy) -> Vec<Option<Shape>> {
+fn groups(study: &ShapeStudy) -> Vec<Option<ContactShape>> {
     let own = study.options.shapes.iter().copied().map(Some).filter(|_| study.by_shape);
     std::iter::once(None).chain(own).collect()
 }

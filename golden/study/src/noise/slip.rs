@@ -69,7 +69,7 @@ pub fn slip_study(
     let mut rows = Vec::new();
     for (level, &noise) in study.levels.iter().enumerate() {
         let converter = study.converter(level);
-        let stated = stated(scene, &converter, study.told);
+        let stated = stated(scene, &converter, study.noise_stated);
         let read = drawn.iter().map(|(_, drawn)| readings(drawn, &converter, &stated));
         let read = read.collect::<Result<Vec<_>, _>>()?;
         for &candidate in &study.candidates {

@@ -56,7 +56,7 @@ pub struct Spread {
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct NoiseRow {
     /// Noise level σ / max|b| of a single frame.
     pub noise: f64,
     /// Number of frames averaged.
@@ -154,7 +154,11 @@ const BOUND_DRAWS: usize = 32;
 ///
 /// # Errors
 /// [`StudyError`]: a scene that the golden model cannot reconstruct, or a parameter out of range.
-pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<Row>, StudyError> {
+pub fn study(
+    scene: &Scene,
+    study: &Study,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Vec<NoiseRow>, StudyError> {
     check_parameters(study.draws, study.frames, &study.levels)?;
     let draws = draws(scene, study);
     let averagings: Vec<Averaging> = if study.frames == 1 { vec![1] } else { vec![1, study.frames] };
@@ -181,7 +185,7 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
                 }
                 let found = Spread::of(errors);
                 let ratio = |bound: Spread| (bound.median > 0.0).then(|| found.median / bound.median);
-                rows.push(Row {
+                rows.push(NoiseRow {
                     noise,
                     frames,
                     objective: kind.name(),

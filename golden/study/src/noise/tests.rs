@@ -2,14 +2,14 @@
 
 use super::*;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions};
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, PartitionSpec, Scene};
 
 /// Medians of few contacts scatter; the ratios of the full study are below 1.3.
 const RATIO: f64 = 1.5;
 
-fn rows(scene: &str, levels: Vec<f64>, objectives: Vec<ObjectiveKind>, frames: usize) -> Vec<Row> {
+fn rows(scene: &str, levels: Vec<f64>, objectives: Vec<ObjectiveKind>, frames: usize) -> Vec<NoiseRow> {
     let scene = Scene::builtin(scene).unwrap();
     let wanted = Study { levels, draws: 40, seed: 5, objectives, frames };
     study(&scene, &wanted, &mut |_, _| ()).unwrap()
@@ -135,29 +135,30 @@ fn several_contacts_have_their_own_errors() {
 }
 
 #[test]
-fn unipolar_readings_untold_noise_and_shapes_are_rows() {
+fn unipolar_readings_unstated_noise_and_shapes_are_rows() {
     let converter = Converter { unipolar: true, ..Default::default() };
-    let options = DrawOptions { converter, shapes: vec![Shape::Ring, Shape::Tilted], ..Default::default() };
-    let run = |told| {
+    let options =
+        DrawOptions { converter, shapes: vec![ContactShape::Ring, ContactShape::Tilted], ..Default::default() };
+    let run = |noise_stated| {
         let wanted = ShapeStudy {
             levels: vec![2e-3],
             draws: 10,
             options: options.clone(),
-            told,
+            noise_stated,
             candidates: vec![SPARSE],
             by_shape: true,
         };
         shape_study(&Scene::builtin("sensor-1").unwrap(), &wanted, &|_, _| ()).unwrap()
     };
-    let (told, untold) = (run(true), run(false));
-    let names: Vec<&str> = told.iter().map(|row| row.shape).collect();
+    let (stated, unstated) = (run(true), run(false));
+    let names: Vec<&str> = stated.iter().map(|row| row.shape).collect();
     assert_eq!(names, ["all", "ring", "tilted", "all", "ring", "tilted"]);
-    assert_eq!(told.iter().map(|row| row.summary.draws).collect::<Vec<_>>(), [10, 5, 5, 10, 5, 5]);
-    assert!(told[3].unipolar && told[3].summary.flagged.value == 1.0 && untold[3].summary.flagged.value < 1.0);
+    assert_eq!(stated.iter().map(|row| row.summary.draws).collect::<Vec<_>>(), [10, 5, 5, 10, 5, 5]);
+    assert!(stated[3].unipolar && stated[3].summary.flagged.value == 1.0 && unstated[3].summary.flagged.value < 1.0);
     // Clipping takes information away: the bound without it is smaller.
     let bipolar = DrawOptions { shapes: options.shapes, ..Default::default() };
     let all = shapes("sensor-1", bipolar, vec![], vec![2e-3]);
-    assert!(all[0].bound.tangential[0] < told[0].bound.tangential[0]);
+    assert!(all[0].bound.tangential[0] < stated[0].bound.tangential[0]);
 }
 
 #[test]
@@ -184,7 +185,8 @@ fn what_is_stated_wrongly_costs_accuracy() {
 fn standard_deviations_of_the_network_are_honest() {
     let scene = Scene::builtin("sensor-1-noisy").unwrap();
     let candidates = vec![Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware];
-    let wanted = ShapeStudy { levels: vec![0.002, 0.01], draws: 100, told: false, candidates, ..Default::default() };
+    let wanted =
+        ShapeStudy { levels: vec![0.002, 0.01], draws: 100, noise_stated: false, candidates, ..Default::default() };
     for row in shape_study(&scene, &wanted, &|_, _| ()).unwrap().iter().filter(|row| row.estimator != "none") {
         let coverage = row.summary.coverage.unwrap();
         assert!((0.55..0.8).contains(&coverage.within_1.value), "{} {}: {coverage:?}", row.estimator, row.noise);
@@ -197,12 +199,12 @@ fn standard_deviations_of_the_network_are_honest() {
 /// stated.
 #[test]
 fn the_hardware_on_bonded_layers_meets_its_limits() {
-    let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+    let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
     let study = ShapeStudy {
         levels: vec![2e-3],
         draws: 102,
         options: DrawOptions { shapes, ..Default::default() },
-        told: false,
+        noise_stated: false,
         candidates: vec![Candidate::Hardware],
         ..Default::default()
     };
@@ -242,8 +244,8 @@ fn the_hardware_of_a_study_has_the_scene_s_estimator() {
     let scene = Scene::builtin("sensor-1").unwrap();
     let study =
         ShapeStudy { levels: vec![1e-3], draws: 20, candidates: vec![Candidate::Hardware], ..Default::default() };
-    let error = |told: bool| {
-        let rows = shape_study(&scene, &ShapeStudy { told, ..study.clone() }, &|_, _| ()).unwrap();
+    let error = |noise_stated: bool| {
+        let rows = shape_study(&scene, &ShapeStudy { noise_stated, ..study.clone() }, &|_, _| ()).unwrap();
         rows[1].summary.tangential.median.value
     };
     // The network where noise is stated, else the search, which cannot find shear in it.

@@ -24,7 +24,7 @@ use super::StudyError;
 use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
-use dermis_golden::data::generator::draws::{DrawOptions, Draws, Shape};
+use dermis_golden::data::generator::draws::{ContactShape, DrawOptions, Draws};
 use dermis_golden::data::generator::GeneratorError;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::estimate::learned::{LearnedError, Signature, GAINS, NOISE, RATIO};
@@ -77,8 +77,8 @@ pub struct UnlikeRow {
     pub estimator: String,
     /// Number of frames.
     pub frames: usize,
-    /// Median of [`network_misfit`](dermis_golden::result::checks::Checks::network_misfit), the noise not stated; `None` if the network was
-    /// asked for none.
+    /// Median of [`network_misfit`](dermis_golden::result::checks::Checks::network_misfit), the noise not stated; `None` if the network
+    /// was evaluated for none.
     pub misfit: Option<f64>,
     /// Share of frames with the flag `misfit`.
     pub flagged: Interval,
@@ -190,7 +190,7 @@ impl Like<'_> {
     fn read(&self, scene: &Scene, number: u64, ratio: [f64; 2], noise: f64) -> Result<Reading, GeneratorError> {
         let wanted = 1 + (number % self.most as u64) as usize;
         let draw = |contacts: usize| {
-            let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+            let shapes = ContactShape::NAMES.map(|(_, shape)| shape).to_vec();
             let ratio = ratio.map(|ratio| ratio * scene.search.mu_max);
             Draws::new(scene, DrawOptions { shapes, contacts, ratio, seed: self.seed, ..Default::default() })?
                 .frame(number)
@@ -244,7 +244,7 @@ fn logarithmic([low, high]: [f64; 2], random: &mut Random) -> f64 {
 }
 
 /// The limit of [`Misfit`] for the network that `scene` names: 99.8 % of `frames` frames as its training draws them are
-/// within it, their noise stated. `None` if the network was asked for none. The frames depend on `seed`.
+/// within it, their noise stated. `None` if the network was evaluated for none. The frames depend on `seed`.
 ///
 /// # Errors
 /// [`StudyError`]: a scene without such a network, or on which no contacts fit.

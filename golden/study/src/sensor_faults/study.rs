@@ -36,12 +36,12 @@ const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 /// What computes, and how it receives a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path {
-    engine: Engine,
+    engine: StudyEngine,
     stream: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Engine {
+enum StudyEngine {
     Golden,
     Stated,
     Fixed,
@@ -50,28 +50,28 @@ enum Engine {
 
 /// The engines, each as `dermis reconstruct --frame` and `--stream` run it.
 pub const ENGINES: [Path; 8] = [
-    Path { engine: Engine::Golden, stream: false },
-    Path { engine: Engine::Golden, stream: true },
-    Path { engine: Engine::Stated, stream: false },
-    Path { engine: Engine::Stated, stream: true },
-    Path { engine: Engine::Fixed, stream: false },
-    Path { engine: Engine::Fixed, stream: true },
-    Path { engine: Engine::Network, stream: false },
-    Path { engine: Engine::Network, stream: true },
+    Path { engine: StudyEngine::Golden, stream: false },
+    Path { engine: StudyEngine::Golden, stream: true },
+    Path { engine: StudyEngine::Stated, stream: false },
+    Path { engine: StudyEngine::Stated, stream: true },
+    Path { engine: StudyEngine::Fixed, stream: false },
+    Path { engine: StudyEngine::Fixed, stream: true },
+    Path { engine: StudyEngine::Network, stream: false },
+    Path { engine: StudyEngine::Network, stream: true },
 ];
 
 impl Path {
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match (self.engine, self.stream) {
-            (Engine::Golden, false) => "golden, frame",
-            (Engine::Golden, true) => "golden, stream",
-            (Engine::Stated, false) => "golden, noise stated, frame",
-            (Engine::Stated, true) => "golden, noise stated, stream",
-            (Engine::Fixed, false) => "fixed, frame",
-            (Engine::Fixed, true) => "fixed, stream",
-            (Engine::Network, false) => "fixed with network, frame",
-            (Engine::Network, true) => "fixed with network, stream",
+            (StudyEngine::Golden, false) => "golden, frame",
+            (StudyEngine::Golden, true) => "golden, stream",
+            (StudyEngine::Stated, false) => "golden, noise stated, frame",
+            (StudyEngine::Stated, true) => "golden, noise stated, stream",
+            (StudyEngine::Fixed, false) => "fixed, frame",
+            (StudyEngine::Fixed, true) => "fixed, stream",
+            (StudyEngine::Network, false) => "fixed with network, frame",
+            (StudyEngine::Network, true) => "fixed with network, stream",
         }
     }
 }
@@ -207,16 +207,16 @@ impl Press {
 }
 
 /// What an engine says of a frame.
-struct Answer {
+struct EngineAnswer {
     flags: BTreeSet<Flag>,
     force_N: [f64; 3],
     sigma_N: Option<[f64; 3]>,
 }
 
-impl Answer {
-    fn of(result: &Reconstruction) -> Answer {
+impl EngineAnswer {
+    fn of(result: &Reconstruction) -> EngineAnswer {
         let flags = result.flags.iter().copied().collect();
-        Answer { flags, force_N: result.resultant_N, sigma_N: result.sigma_N() }
+        EngineAnswer { flags, force_N: result.resultant_N, sigma_N: result.sigma_N() }
     }
 }
 
@@ -241,15 +241,20 @@ impl Engines<'_> {
     }
 
     /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it, or the scene has it not.
-    fn answers(&self, engine: Engine, stream: &[Vec<f64>], noise_MPa: f64) -> Result<[Option<Answer>; 2], StudyError> {
+    fn answers(
+        &self,
+        engine: StudyEngine,
+        stream: &[Vec<f64>],
+        noise_MPa: f64,
+    ) -> Result<[Option<EngineAnswer>; 2], StudyError> {
         let frames = stream.iter().map(|stress| Frame::from_stress("spoiled", &self.scene.sensor, stress.clone()));
         let frames: Vec<Frame> = frames.collect::<Result<_, _>>()?;
         let Some(last) = frames.last() else { return Ok([None, None]) };
         let result = match engine {
-            Engine::Golden => self.golden.run(last).map_err(StudyError::from),
-            Engine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
-            Engine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
-            Engine::Network => match &self.network {
+            StudyEngine::Golden => self.golden.run(last).map_err(StudyError::from),
+            StudyEngine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
+            StudyEngine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
+            StudyEngine::Network => match &self.network {
                 Some(network) => network.result(std::slice::from_ref(last), true).map_err(StudyError::from),
                 None => return Ok([None, None]),
             },
@@ -269,19 +274,19 @@ impl Engines<'_> {
             let checks = history.add(std::slice::from_ref(frame), in_stream.checks);
             in_stream.diagnostics().add_checks(self.scene, checks);
         }
-        Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
+        Ok([result, in_stream].map(|result| Some(EngineAnswer::of(&result))))
     }
 
     /// The verdicts of all [`ENGINES`] on a press with a fault; a clean press has the noise of its size.
     fn judge(&self, press: &Press, fault: &Fault, size: f64, noise: f64) -> Result<Vec<Judged>, StudyError> {
         let mut all = Vec::with_capacity(ENGINES.len());
-        for engine in [Engine::Golden, Engine::Stated, Engine::Fixed, Engine::Network] {
+        for engine in [StudyEngine::Golden, StudyEngine::Stated, StudyEngine::Fixed, StudyEngine::Network] {
             let noise = if fault.kind == Kind::Clean { size } else { noise_of(engine, noise) };
             let stream = press.spoiled(&self.scene.sensor, fault, size, noise);
             let last = stream.last().map_or(&[][..], |last| last);
             let truth_N = (fault.kind != Kind::NoContact).then_some(press.total_N);
             let answers = self.answers(engine, &stream, noise * press.peak_MPa)?;
-            let absent = engine == Engine::Network && self.network.is_none();
+            let absent = engine == StudyEngine::Network && self.network.is_none();
             all.extend(answers.map(|answer| match answer {
                 Some(answer) => Judged::Result(answer.judged(&self.scene.sensor, last, truth_N)),
                 None if absent => Judged::Absent,
@@ -293,9 +298,9 @@ impl Engines<'_> {
 }
 
 /// Noise over the peak of the frames that an engine gets.
-fn noise_of(engine: Engine, noise: f64) -> f64 {
+fn noise_of(engine: StudyEngine, noise: f64) -> f64 {
     match engine {
-        Engine::Stated if noise == 0.0 => STATED,
+        StudyEngine::Stated if noise == 0.0 => STATED,
         _ => noise,
     }
 }
@@ -318,7 +323,7 @@ struct Verdict {
     z: Option<f64>,
 }
 
-impl Answer {
+impl EngineAnswer {
     /// Compared with the true force; `None` where nothing presses.
     fn judged(self, sensor: &Sensor, last: &[f64], truth_N: Option<[f64; 3]>) -> Verdict {
         let (tangential, normal, none) = RIGHT;
@@ -392,32 +397,32 @@ fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
 /// fits.
 pub fn sensor_faults(
     scenes: &[Scene],
-    asked: &SensorFaults,
+    study: &SensorFaults,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<FaultRow>, StudyError> {
-    let lines = lines(asked)?;
+    let lines = lines(study)?;
     let engines = scenes.iter().map(Engines::new).collect::<Result<Vec<_>, _>>()?;
-    let presses = scenes.iter().map(|scene| presses(scene, asked)).collect::<Result<Vec<_>, _>>()?;
+    let presses = scenes.iter().map(|scene| presses(scene, study)).collect::<Result<Vec<_>, _>>()?;
     let tasks_of = |fault: &'static Fault, size: f64| {
-        let most = if fault.kind == Kind::NoContact { NO_CONTACT_FRAMES } else { asked.frames };
-        let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(asked.frames)).map(move |press| (scene, press)));
+        let most = if fault.kind == Kind::NoContact { NO_CONTACT_FRAMES } else { study.frames };
+        let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(study.frames)).map(move |press| (scene, press)));
         all.map(move |(scene, press)| Task { scene, fault, size, press })
     };
     // Clean frames with the noise of each engine, whose flags say nothing of a fault.
     let clean = &FAULTS[0];
-    let noises = if asked.noise == 0.0 { vec![0.0, STATED] } else { vec![asked.noise] };
+    let noises = if study.noise == 0.0 { vec![0.0, STATED] } else { vec![study.noise] };
     let controls: Vec<Task> = noises.into_iter().flat_map(|noise| tasks_of(clean, noise)).collect();
     let tasks: Vec<Task> = lines.iter().flat_map(|(fault, size)| tasks_of(fault, *size)).collect();
     let step = steps(progress, controls.len() + tasks.len());
     let judge = |task: &Task| {
-        let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, asked.noise);
+        let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, study.noise);
         step();
         judged
     };
     let judged = |tasks: &[Task]| tasks.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>, StudyError>>();
     let (control, spoiled) = (judged(&controls)?, judged(&tasks)?);
     let carried = |scene: usize, path: usize| {
-        let noise = noise_of(ENGINES[path].engine, asked.noise);
+        let noise = noise_of(ENGINES[path].engine, study.noise);
         let own = std::iter::zip(&controls, &control).filter(|(task, _)| task.scene == scene && task.size == noise);
         always(&own.map(|(_, judged)| &judged[path]).collect::<Vec<_>>())
     };
@@ -440,15 +445,15 @@ pub fn sensor_faults(
 /// A spoiled frame: the fault, its size in words, the readings.
 pub type Spoiled = (&'static str, String, Frame);
 
-/// The last frame of every press, spoiled by every fault of every size that `asked` names, as the engines without stated noise get it.
+/// The last frame of every press, spoiled by every fault of every size that `study` names, as the engines without stated noise get it.
 ///
 /// # Errors
 /// As [`sensor_faults`].
-pub fn spoiled_frames(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Spoiled>, StudyError> {
-    let (lines, presses) = (lines(asked)?, presses(scene, asked)?);
+pub fn spoiled_frames(scene: &Scene, study: &SensorFaults) -> Result<Vec<Spoiled>, StudyError> {
+    let (lines, presses) = (lines(study)?, presses(scene, study)?);
     let all = lines.iter().flat_map(|line| presses.iter().map(move |press| (*line, press)));
     let spoiled = |((fault, size), press): ((&'static Fault, f64), &Press)| {
-        let noise = if fault.kind == Kind::Clean { size } else { asked.noise };
+        let noise = if fault.kind == Kind::Clean { size } else { study.noise };
         let last = press.spoiled(&scene.sensor, fault, size, noise).pop().unwrap_or_default();
         Ok((fault.name, fault.unit.text(size), Frame::from_stress("spoiled", &scene.sensor, last)?))
     };
@@ -456,41 +461,41 @@ pub fn spoiled_frames(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Spoiled
 }
 
 /// The faults that are asked for, with the sizes that are measured.
-fn lines(asked: &SensorFaults) -> Result<Vec<(&'static Fault, f64)>, StudyError> {
-    let sizes = |fault: &'static Fault| match asked.quick {
+fn lines(study: &SensorFaults) -> Result<Vec<(&'static Fault, f64)>, StudyError> {
+    let sizes = |fault: &'static Fault| match study.quick {
         true => &fault.sizes[fault.sizes.len() / 2..][..1],
         false => fault.sizes,
     };
     let with_sizes = |fault: &'static Fault| sizes(fault).iter().map(move |size| (fault, *size));
-    Ok(chosen(asked)?.into_iter().flat_map(with_sizes).collect())
+    Ok(chosen(study)?.into_iter().flat_map(with_sizes).collect())
 }
 
 /// The faults that are asked for.
-fn chosen(asked: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
+fn chosen(study: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
     let fail = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
-    if !(1..=MOST_FRAMES).contains(&asked.frames) {
-        return fail("frames", asked.frames.to_string(), "a whole number from 1 to 100000");
+    if !(1..=MOST_FRAMES).contains(&study.frames) {
+        return fail("frames", study.frames.to_string(), "a whole number from 1 to 100000");
     }
-    if !(asked.noise >= 0.0 && asked.noise <= 1.0) {
-        return fail("noise", asked.noise.to_string(), "a number from 0 to 1");
+    if !(study.noise >= 0.0 && study.noise <= 1.0) {
+        return fail("noise", study.noise.to_string(), "a number from 0 to 1");
     }
-    if let Some(unknown) = asked.only.iter().find(|name| FAULTS.iter().all(|fault| fault.name != **name)) {
+    if let Some(unknown) = study.only.iter().find(|name| FAULTS.iter().all(|fault| fault.name != **name)) {
         return fail("fault", format!("{unknown:?}"), "the name of a fault, as the table has it");
     }
-    let wanted = |fault: &&Fault| asked.only.is_empty() || asked.only.iter().any(|name| name == fault.name);
+    let wanted = |fault: &&Fault| study.only.is_empty() || study.only.iter().any(|name| name == fault.name);
     Ok(FAULTS.iter().filter(wanted).collect())
 }
 
 /// The presses of a scene.
-pub(super) fn presses(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Press>, StudyError> {
-    let draws = Draws::new(scene, DrawOptions { seed: asked.seed, ..DrawOptions::default() })?;
+pub(super) fn presses(scene: &Scene, study: &SensorFaults) -> Result<Vec<Press>, StudyError> {
+    let draws = Draws::new(scene, DrawOptions { seed: study.seed, ..DrawOptions::default() })?;
     let press = |number: u64| -> Result<Press, GeneratorError> {
         let (own, other) = (draws.frame(number)?, draws.frame(number + 1)?);
         let peak_MPa = own.exact_MPa.iter().fold(0.0f64, |peak, b| b.max(peak));
         let peak_taxel = own.exact_MPa.iter().position(|b| *b == peak_MPa).unwrap_or(0);
-        let seed = asked.seed.wrapping_mul(SPREAD) ^ number;
+        let seed = study.seed.wrapping_mul(SPREAD) ^ number;
         let (exact_MPa, other_MPa, total_N) = (own.exact_MPa, other.exact_MPa, own.total_N);
         Ok(Press { exact_MPa, other_MPa, total_N, peak_MPa, peak_taxel, seed })
     };
-    Ok((0..asked.frames as u64).map(press).collect::<Result<_, _>>()?)
+    Ok((0..study.frames as u64).map(press).collect::<Result<_, _>>()?)
 }

@@ -196,24 +196,24 @@ fn patterns_that_no_contact_causes() {
     near(&rectified, |i, j| noise[i * COLS + j].abs());
 }
 
-fn rows(asked: &SensorFaults) -> Vec<FaultRow> {
-    sensor_faults(&[Scene::builtin("eight-by-eight").unwrap()], asked, &|_, _| ()).unwrap()
+fn rows(study: &SensorFaults) -> Vec<FaultRow> {
+    sensor_faults(&[Scene::builtin("eight-by-eight").unwrap()], study, &|_, _| ()).unwrap()
 }
 
 /// Equal seeds give equal rows, whatever else is measured, and each frame has one verdict.
 #[test]
 fn rows_depend_on_the_seed_alone() {
     let only = ["clean, noise", "row doubled"].map(str::to_owned).to_vec();
-    let asked = SensorFaults { frames: 2, quick: true, only, ..Default::default() };
-    let both = rows(&asked);
+    let study = SensorFaults { frames: 2, quick: true, only, ..Default::default() };
+    let both = rows(&study);
     assert_eq!(both.iter().map(|row| row.size.as_str()).collect::<Vec<_>>(), ["0.2 %", ""]);
     assert!(both
         .iter()
         .flat_map(|row| row.engines.iter().enumerate())
         .all(|(path, of)| of.frames == if path < 6 { 2 } else { 0 } && of.flagged + of.silent + of.right == of.frames));
-    let alone = rows(&SensorFaults { only: vec!["row doubled".to_owned()], ..asked.clone() });
+    let alone = rows(&SensorFaults { only: vec!["row doubled".to_owned()], ..study.clone() });
     assert_eq!(alone, both[1..]);
-    assert_ne!(rows(&SensorFaults { seed: 2, only: vec!["clean, noise".to_owned()], ..asked })[0], both[0]);
+    assert_ne!(rows(&SensorFaults { seed: 2, only: vec!["clean, noise".to_owned()], ..study })[0], both[0]);
     const { assert!(MOMENTS > 8) };
 }
 
@@ -242,8 +242,8 @@ fn silently_wrong_frames_are_no_more_than_measured() {
 fn the_network_of_a_scene_has_columns_of_its_own() {
     let names = ["baseline offset", "taxel stuck, at the peak", "row doubled", "coarse codes", "sign reversed"];
     let only = names.map(str::to_owned).to_vec();
-    let asked = SensorFaults { frames: 1, quick: true, only, ..Default::default() };
-    let rows = sensor_faults(&[Scene::builtin("sensor-1").unwrap()], &asked, &|_, _| ()).unwrap();
+    let study = SensorFaults { frames: 1, quick: true, only, ..Default::default() };
+    let rows = sensor_faults(&[Scene::builtin("sensor-1").unwrap()], &study, &|_, _| ()).unwrap();
     assert_eq!(rows.len(), names.len());
     for row in rows {
         let [search, network] = [5, 7].map(|path| row.engines[path]);
@@ -257,13 +257,13 @@ fn the_network_of_a_scene_has_columns_of_its_own() {
 fn the_work_of_a_frame_is_bounded() {
     let scene = Scene::builtin("sensor-1").unwrap();
     let evidence = Evidence::new(&scene);
-    let asked = |frames: usize| SensorFaults { frames, seed: 63, ..Default::default() };
+    let study = |frames: usize| SensorFaults { frames, seed: 63, ..Default::default() };
     let work = |evidence: &Evidence, b: &[f64]| evidence.solve(b, None).work;
-    let presses = presses(&scene, &asked(60)).unwrap();
+    let presses = presses(&scene, &study(60)).unwrap();
     let mut clean: Vec<u64> = presses.par_iter().map(|press| work(&evidence, &press.exact_MPa)).collect();
     clean.sort_unstable();
     let median = clean[clean.len() / 2];
-    let spoiled = spoiled_frames(&scene, &asked(3)).unwrap();
+    let spoiled = spoiled_frames(&scene, &study(3)).unwrap();
     let works = |evidence: &Evidence| -> Vec<(u64, &str, &str)> {
         let of = |own: &Spoiled| work(evidence, &own.2.stress_MPa);
         let mut all: Vec<_> = spoiled.par_iter().map(|own| (of(own), own.0, own.1.as_str())).collect();
@@ -281,7 +281,7 @@ fn the_work_of_a_frame_is_bounded() {
 #[test]
 fn what_is_out_of_range_is_named() {
     let scene = [Scene::builtin("eight-by-eight").unwrap()];
-    let error = |asked: SensorFaults| sensor_faults(&scene, &asked, &|_, _| ()).unwrap_err().to_string();
+    let error = |study: SensorFaults| sensor_faults(&scene, &study, &|_, _| ()).unwrap_err().to_string();
     let text = error(SensorFaults { only: vec!["gremlins".to_owned()], ..Default::default() });
     assert_eq!(text, "fault = \"gremlins\" is not allowed; it must be the name of a fault, as the table has it");
     assert!(error(SensorFaults { frames: 0, ..Default::default() }).starts_with("frames = 0 is not allowed"));

@@ -72,7 +72,7 @@ pub struct Outcome {
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ExtremeRow {
     /// Id of the frame.
     pub frame: String,
     /// Result of the floating-point model.
@@ -133,7 +133,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     };
     let middle = (sensor.rows / 2, sensor.cols / 2);
     let second = press.stress_MPa.iter().filter(|b| b.abs() < peak).fold(0.0f64, |second, b| second.max(b.abs()));
-    let mut all = vec![
+    let mut extremes = vec![
         plain(bare("zero", &|_, _| 0.0)),
         plain(bare("spike, one taxel", &|row, col| if (row, col) == middle { STRESS_MPA } else { 0.0 })),
         with_scale(Frame { id: "one taxel saturated".into(), ..press.clone() }, (peak + second) / 2.0),
@@ -150,31 +150,31 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     // A network serves the readings and the partition that it was trained for.
     let network = scene.hardware_estimator() == EstimatorKind::Network;
     if scene.input.unipolar || !network {
-        all.push(unipolar);
+        extremes.push(unipolar);
     }
     let decade = |k: &i32| with_scale(scaled(format!("load 1e{k} of full scale"), 10f64.powi(*k)), peak);
-    all.extend(DECADES.iter().map(decade));
-    all.extend(OCTAVES.iter().map(|k| plain(scaled(format!("load 2^{k}, own full scale"), 2f64.powi(*k)))));
-    all.push(plain(circle("over the edge", "hertz-circle", radius, [half_x, 0.0], mu)?));
-    all.push(plain(circle("in the corner", "hertz-circle", radius, [-half_x, half_y], mu)?));
+    extremes.extend(DECADES.iter().map(decade));
+    extremes.extend(OCTAVES.iter().map(|k| plain(scaled(format!("load 2^{k}, own full scale"), 2f64.powi(*k)))));
+    extremes.push(plain(circle("over the edge", "hertz-circle", radius, [half_x, 0.0], mu)?));
+    extremes.push(plain(circle("in the corner", "hertz-circle", radius, [-half_x, half_y], mu)?));
     // The first of the paper's cases 2 and 3 that divides the array through its middle.
     let cuts = [2, 3].into_iter().filter_map(Case::numbered).find(|case| subarrays(*case, sensor).is_ok());
     if let Some(case) = cuts.filter(|_| !network) {
         let mut cut = plain(circle("on a subarray boundary", "hertz-circle", radius, [0.0; 2], mu)?);
         cut.scene.partition.case = case;
-        all.push(cut);
+        extremes.push(cut);
     }
     let [x, y] = sensor.position_mm(middle.0, middle.1);
-    all.push(plain(circle("smaller than a taxel", "hertz-circle", 0.2 * pitch, [x, y], mu)?));
-    all.push(plain(circle("larger than the array", "flat-punch", 2.0 * half_x.hypot(half_y), [0.0; 2], mu)?));
-    Ok(all)
+    extremes.push(plain(circle("smaller than a taxel", "hertz-circle", 0.2 * pitch, [x, y], mu)?));
+    extremes.push(plain(circle("larger than the array", "flat-punch", 2.0 * half_x.hypot(half_y), [0.0; 2], mu)?));
+    Ok(extremes)
 }
 
 /// Runs both models on an extreme frame.
 ///
 /// # Errors
 /// [`GoldenError`] if the golden model rejects scene or frame.
-pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
+pub fn outcome(extreme: &Extreme) -> Result<ExtremeRow, GoldenError> {
     let Extreme { scene, frame } = extreme;
     let golden = Golden::reference(scene)?.run(frame)?;
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
@@ -186,7 +186,7 @@ pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
         Ok((result, status)) => (Some(of(&result)), status, None),
         Err(error) => (None, String::new(), Some(error.to_string())),
     };
-    Ok(Row { frame: frame.id.clone(), golden: of(&golden), fixed, status, refused })
+    Ok(ExtremeRow { frame: frame.id.clone(), golden: of(&golden), fixed, status, refused })
 }
 
 fn of(result: &Reconstruction) -> Outcome {

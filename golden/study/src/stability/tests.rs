@@ -1,6 +1,6 @@
 //! The values of the table against its targets, and rejected scenes in its rows.
 
-use super::extreme::{frames, outcome, Outcome, Row as ExtremeRow};
+use super::extreme::{frames, outcome, ExtremeRow, Outcome};
 use super::*;
 use dermis_golden::estimate::float::pass::solve_direct;
 use dermis_golden::result::flags::Flag;
@@ -13,7 +13,7 @@ fn scene(h: f64, kind: InverseKind) -> Scene {
     scene
 }
 
-fn row(h: f64, kind: InverseKind) -> Row {
+fn row(h: f64, kind: InverseKind) -> StabilityRow {
     measure(&Setting::new("thickness", scene(h, kind))).unwrap()
 }
 

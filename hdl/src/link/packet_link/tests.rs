@@ -14,7 +14,7 @@ use crate::wire::Word;
 
 /// Beats of labels and statuses of a frame, after the forces.
 const OTHER_BEATS: usize = 3;
-const SHAPE: Shape = Shape {
+const PARAMS: PacketParams = PacketParams {
     rows: TAXELS / 4,
     cols: 4,
     input_bits: 12,
@@ -35,7 +35,7 @@ fn identity() -> Identity {
 
 fn subject(changes: &[Change]) -> Subject<'static> {
     subject_of!(
-        PacketLink::new(&SHAPE, &identity()),
+        PacketLink::new(&PARAMS, &identity()),
         changes,
         inputs [
             rst, receive_data, receive_valid, receive_broken, send_ready, s_axis_tready, m_axis_tdata, m_axis_tvalid,
@@ -109,10 +109,10 @@ impl Around {
             self.answers.extend(self.decoder.next(outputs[0].number() as u8).map(|packet| packet.unwrap()));
         }
         if is_high(3) && takes_code {
-            let beat = outputs[2].signed(0, SHAPE.stream_bits()) as i32;
+            let beat = outputs[2].signed(0, PARAMS.stream_bits()) as i32;
             self.codes.push(beat);
             // An image's bytes are no codes, and come between frames.
-            let is_byte = |beat: i32| beat >= 1 << (SHAPE.input_bits - 1);
+            let is_byte = |beat: i32| beat >= 1 << (PARAMS.input_bits - 1);
             assert!(self.codes.iter().all(|&other| is_byte(other) == is_byte(beat)), "{:?}", self.codes);
             let count = if is_byte(beat) { IMAGE_BYTES } else { TAXELS };
             match (is_high(4), self.codes.len() == count) {
@@ -186,13 +186,13 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
             Kind::Tables,
         ][number as usize % 6];
         let is_frame = [Kind::FrameForForces, Kind::FrameForResultants].contains(&kind);
-        let half = 1 << (SHAPE.input_bits - 1);
+        let half = 1 << (PARAMS.input_bits - 1);
         let (codes, payload) = if kind == Kind::Tables {
             let image: Vec<u8> = (0..IMAGE_BYTES).map(|_| random.u8(..)).collect();
-            (load::beats(&image, SHAPE.input_bits), image)
+            (load::beats(&image, PARAMS.input_bits), image)
         } else {
             let codes: Vec<i32> = (0..if is_frame { TAXELS } else { 0 }).map(|_| random.i32(-half..half)).collect();
-            let payload = codes_to_bytes(&codes, SHAPE.input_bits);
+            let payload = codes_to_bytes(&codes, PARAMS.input_bits);
             (codes, payload)
         };
         let packet = Packet { kind, sequence: number, payload };
@@ -216,7 +216,7 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
             Kind::Identify => identity().to_bytes(),
             Kind::FrameForForces => of_beats(&beats),
             Kind::FrameForResultants => {
-                [Sums::of(&beats[..TAXELS], SHAPE.cols).to_bytes(), of_beats(&beats[TAXELS..])].concat()
+                [Sums::of(&beats[..TAXELS], PARAMS.cols).to_bytes(), of_beats(&beats[TAXELS..])].concat()
             }
             _ => around.counters.to_bytes(),
         };

@@ -13,10 +13,10 @@ block! {
     }
     ports CaseEqualPorts {
         /// Index of the case; valid with `value`.
-        in which: count_bits(values.len());
+        in case_index: count_bits(values.len());
         /// The count, unsigned; compared in the same cycle.
         in value: bits;
-        /// `value` is that of case `which`; combinational.
+        /// `value` is that of case `case_index`; combinational.
         out equal;
     }
 }
@@ -30,7 +30,7 @@ impl CaseEqual {
 
 impl Block for CaseEqual {
     fn build<'k>(&self, k: &'k Builder, io: CaseEqualPorts<Inside<'k>>) {
-        io.equal.set(io.value.equals(value_by_case(k, io.which, &self.values, self.bits)));
+        io.equal.set(io.value.equals(value_by_case(k, io.case_index, &self.values, self.bits)));
     }
 }
 

@@ -18,7 +18,7 @@ block! {
     }
     ports LaneMaskPorts {
         /// Index of the case; valid with `address`.
-        in which: count_bits(layouts.len());
+        in case_index: count_bits(layouts.len());
         /// Address of the step in the subarray; taken in the same cycle.
         in address: count_bits(layouts.iter().map(Quads::len).max().unwrap_or(1) * (Quads::LANES / lanes));
         /// One bit per lane, which is counted; combinational from `address`.
@@ -32,16 +32,22 @@ impl LaneMask {
         LaneMask { layouts: layouts.to_vec(), lanes }
     }
 
-    /// The mask of the step `address` of case `which`, by instance `name`; without instance and address where each lane always
+    /// The mask of the step `address` of case `case_index`, by instance `name`; without instance and address where each lane always
     /// counts.
-    pub fn of<'k>(&self, k: &'k Builder, name: &str, which: Expr<'k>, address: impl FnOnce() -> Expr<'k>) -> Expr<'k> {
+    pub fn of<'k>(
+        &self,
+        k: &'k Builder,
+        name: &str,
+        case_index: Expr<'k>,
+        address: impl FnOnce() -> Expr<'k>,
+    ) -> Expr<'k> {
         let all = (1 << self.lanes) - 1;
         let steps = 0..1 << self.widths().address;
         if self.layouts.iter().all(|layout| steps.clone().all(|step| mask(Some(layout), self.lanes, step) == all)) {
             return k.constant(self.lanes, all);
         }
         let instance = k.instance(name, self);
-        instance.which.set(which);
+        instance.case_index.set(case_index);
         instance.address.set(address());
         instance.mask
     }
@@ -50,9 +56,9 @@ impl LaneMask {
 impl Block for LaneMask {
     fn build<'k>(&self, _: &'k Builder, io: LaneMaskPorts<Inside<'k>>) {
         let steps = 0..1 << io.address.bits();
-        let cases = (0..1 << io.which.bits()).map(|case| self.layouts.get(case));
+        let cases = (0..1 << io.case_index.bits()).map(|case| self.layouts.get(case));
         let masks = cases.flat_map(|layout| steps.clone().map(move |step| mask(layout, self.lanes, step)));
-        io.mask.set(io.which.concat(io.address).table(self.lanes, &masks.collect::<Vec<u64>>()));
+        io.mask.set(io.case_index.concat(io.address).table(self.lanes, &masks.collect::<Vec<u64>>()));
     }
 }
 

@@ -67,7 +67,7 @@ block! {
     }
     ports QuadAddressPorts {
         /// Index of the case; valid with `row`.
-        in which: count_bits(places.cases.len());
+        in case_index: count_bits(places.cases.len());
         /// Row of the taxel in its subarray; taken in the same cycle.
         in row: places.count_bits(|(layout, _)| layout.rows);
         /// Column of the taxel in its subarray; valid with `row`.
@@ -166,7 +166,7 @@ impl Block for QuadAddress {
         let places: Vec<(Expr, Expr, Place)> = cases.iter().map(place).collect();
         let chosen = |of: for<'p> fn(&(Expr<'p>, Expr<'p>, Place<'p>)) -> Expr<'p>, bits: usize| {
             let each: Vec<Expr> = places.iter().map(of).collect();
-            expression_by_case(io.which, &each).unwrap_or(k.constant(bits, 0))
+            expression_by_case(io.case_index, &each).unwrap_or(k.constant(bits, 0))
         };
         let quad = chosen(|(_, address, _)| *address, address_bits);
         let (lower, right) = (chosen(|(.., place)| place.lower, 1), chosen(|(.., place)| place.right, 1));
@@ -222,16 +222,17 @@ mod tests {
                 let mirror = QuadAddress { places: Places { cases: cases.clone(), frame_quads: frame, lanes } };
                 let mut random = fastrand::Rng::with_seed(20);
                 let mut taxel = || {
-                    let which = random.usize(..cases.len());
-                    let (layout, grid) = cases[which];
+                    let case_index = random.usize(..cases.len());
+                    let (layout, grid) = cases[case_index];
                     let limits = [layout.rows, layout.cols, grid.rows, grid.cols];
                     let place = limits.map(|limit| Word::from(random.u64(..limit as u64)));
-                    [Word::from(which as u64)].into_iter().chain(place).collect()
+                    [Word::from(case_index as u64)].into_iter().chain(place).collect()
                 };
                 let stimulus: Vec<Vec<Word>> = (0..20000).map(|_| taxel()).collect();
                 let of = |inputs: &[Word]| {
-                    let [which, row, col, part_row, part_col] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() as usize);
-                    let (layout, grid) = cases[which];
+                    let [case_index, row, col, part_row, part_col] =
+                        [0, 1, 2, 3, 4].map(|k| inputs[k].number() as usize);
+                    let (layout, grid) = cases[case_index];
                     let (place, part) = (layout.locate(row, col), part_row * grid.cols + part_col);
                     let taxel = 4 * (part * layout.len() + place.address) + place.lane;
                     let mask = usize::from(place.mask);

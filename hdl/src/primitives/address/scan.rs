@@ -17,7 +17,7 @@ block! {
     ports ScanPorts {
         clock;
         /// Index of the case; constant from the first taxel to the last.
-        in which: count_bits(places.cases.len());
+        in case_index: count_bits(places.cases.len());
         /// Back to the first taxel, with priority over `enable`.
         in clear;
         /// Advances to the next taxel at the clock edge; after the last to the first.
@@ -61,9 +61,9 @@ impl Block for Scan {
 
         for counter in [&col, &part_col, &row, &part_row] {
             counter.clear.set(io.clear);
-            counter.which.set(io.which);
+            counter.case_index.set(io.case_index);
         }
-        quad_address.which.set(io.which);
+        quad_address.case_index.set(io.case_index);
         let line_end = k.wire("line_end", io.enable & col.last & part_col.last);
         let row_end = io.row_end.set(line_end & row.last);
         col.enable.set(io.enable);
@@ -116,8 +116,8 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [which, clear, enable] = [0, 1, 2].map(|input| inputs[input].number() as usize);
-            let count = taxels(&self.cases[which]);
+            let [case_index, clear, enable] = [0, 1, 2].map(|input| inputs[input].number() as usize);
+            let count = taxels(&self.cases[case_index]);
             self.passed = if clear == 1 { Some(0) } else { self.passed.map(|taxel| (taxel + enable) % count) };
         }
     }
@@ -127,13 +127,13 @@ mod tests {
         let model = model(10, 14, "[partition]\ncases = [0, 1, 2, 3]\n");
         for lanes in [4, 1] {
             let mut random = fastrand::Rng::with_seed(lanes as u64);
-            let (mut which, mut left) = (0, 1);
+            let (mut case_index, mut left) = (0, 1);
             let mut cycle = || {
                 left -= 1;
                 // Another case after a `clear`; every second time after the array was passed more than once.
-                let inputs = [which, u64::from(left == 0), u64::from(random.u8(..8) > 0)];
+                let inputs = [case_index, u64::from(left == 0), u64::from(random.u8(..8) > 0)];
                 if left == 0 {
-                    (which, left) = (random.u64(..model.cases().len() as u64), random.usize(1..400));
+                    (case_index, left) = (random.u64(..model.cases().len() as u64), random.usize(1..400));
                 }
                 inputs.map(Word::from).into()
             };
@@ -142,7 +142,7 @@ mod tests {
                 subject_of!(
                     Scan::new(model.cases(), lanes),
                     changes,
-                    inputs [which, clear, enable],
+                    inputs [case_index, clear, enable],
                     outputs [last, row_end, address, part, lane, mask],
                 )
             };

@@ -55,7 +55,7 @@ block! {
         /// Synchronous reset, active high; clears the control pipeline and, two cycles later, the accumulators.
         in rst;
         /// Index of the section; constant from its first product to its last row.
-        in which: count_bits(groups.len());
+        in section: count_bits(groups.len());
         /// Address in the coefficient memory; three cycles before `valid` of its product.
         in address: count_bits(memory.len());
         /// Four operands, one per parity, 18 bits each, signed; valid with `valid`.
@@ -259,14 +259,14 @@ impl Lanes {
     /// Rows that leave after the present group; a counter of the groups where there are several.
     fn rows<'k>(&self, k: &'k Builder, io: &LanesPorts<Inside<'k>>, captured: Expr<'k>) -> Expr<'k> {
         let row_bits = count_bits(self.per_parity + 1);
-        let last_rows = value_by_case(k, io.which, &self.last_rows, row_bits);
+        let last_rows = value_by_case(k, io.section, &self.last_rows, row_bits);
         let groups = largest(&self.groups);
         if groups == 1 {
             return last_rows;
         }
         let ends: Vec<usize> = self.groups.iter().map(|groups| groups - 1).collect();
         let group = k.state("group", Type::unsigned(count_bits(groups)), io.rst, 0);
-        let is_last = k.wire("last_group", group.equals(value_by_case(k, io.which, &ends, group.bits())));
+        let is_last = k.wire("last_group", group.equals(value_by_case(k, io.section, &ends, group.bits())));
         k.when(captured, || group.set(is_last.mux(k.constant(group.bits(), 0), group.plus(1))));
         is_last.mux(last_rows, k.constant(row_bits, self.per_parity as u64))
     }
@@ -299,17 +299,17 @@ impl Lanes {
         let valid2 = valid2();
         k.when(valid2, || signature.set(so_far.low(31).concat(odd_fours.parity()) ^ feedback));
         let expected: Vec<usize> = signatures.iter().map(|&signature| signature as usize).collect();
-        let differs = |which: Expr<'k>| signature.differs(value_by_case(k, which, &expected, 32));
+        let differs = |section: Expr<'k>| signature.differs(value_by_case(k, section, &expected, 32));
         if !self.in_turn {
-            io.damaged.set(differs(io.which));
+            io.damaged.set(differs(io.section));
             return;
         }
         k.comment("A section that begins keeps whether one before it in its subarray was damaged.");
-        let (section, earlier) = (k.register("section", io.which.ty()), k.register("earlier", Type::unsigned(1)));
-        let damaged = io.damaged.set(differs(*section) | *earlier);
+        let (begun, earlier) = (k.register("begun", io.section.ty()), k.register("earlier", Type::unsigned(1)));
+        let damaged = io.damaged.set(differs(*begun) | *earlier);
         k.when(opens2 & valid2, || {
-            section.set(io.which);
-            earlier.set(!io.which.is(0) & damaged);
+            begun.set(io.section);
+            earlier.set(!io.section.is(0) & damaged);
         });
     }
 
@@ -410,12 +410,12 @@ mod tests {
     }
 
     impl Integers {
-        /// Whether the signature, or one before it, is not that of the case `which`.
-        fn damaged(&self, which: usize) -> Option<bool> {
+        /// Whether the signature, or one before it, is not that of `section`.
+        fn damaged(&self, section: usize) -> Option<bool> {
             let Some(expected) = &self.shape.signatures else { return Some(false) };
             match self.shape.in_turn {
                 true => Some(self.earlier? | (self.signature? != expected[self.section])),
-                false => Some(self.signature? != expected[which]),
+                false => Some(self.signature? != expected[section]),
             }
         }
 
@@ -467,9 +467,9 @@ mod tests {
                 self.accumulate(&added);
                 let opens = self.shape.control.opens_at().is_some_and(|bit| added.control >> bit & 1 == 1);
                 if opens {
-                    let which = inputs[1].number() as usize;
-                    self.earlier = if which == 0 { Some(false) } else { self.damaged(which) };
-                    self.section = which;
+                    let section = inputs[1].number() as usize;
+                    self.earlier = if section == 0 { Some(false) } else { self.damaged(section) };
+                    self.section = section;
                 }
                 let start = if opens { Some(START) } else { self.signature };
                 self.signature = start.map(|signature| step(signature, parity(&self.shape.memory[added.word])));

@@ -133,7 +133,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Rescaler = Rescaler { acc: 45, lane: 41, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
+    const BLOCK: Rescaler = Rescaler { acc: 45, lane: 41, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
 
     /// The quads on their way with their shift, and the counts.
     #[derive(Default)]
@@ -151,26 +151,26 @@ mod tests {
     impl Reference for Quads {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             vec![
-                self.words.map(|words| Word::of_fields(&words, SHAPE.word)),
-                self.operands.map(|operands| Word::of_fields(&operands, SHAPE.data)),
+                self.words.map(|words| Word::of_fields(&words, BLOCK.word)),
+                self.operands.map(|operands| Word::of_fields(&operands, BLOCK.data)),
                 self.count.map(|count| Word::from(count as u64)),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let operand = |word| saturate(round_shift(word, SEARCH_EXTRA_BITS), SHAPE.data as u32).0;
+            let operand = |word| saturate(round_shift(word, SEARCH_EXTRA_BITS), BLOCK.data as u32).0;
             self.operands = self.words.map(|words| words.map(operand));
             let counted = self.count.zip(self.clips).map(|(count, clips)| (count + clips).min(0xffff));
             self.count = if inputs[0].number() == 1 { Some(0) } else { counted };
             self.clips = self.clipped;
             let rounded =
-                self.shifted.map(|(quad, valid)| (quad.map(|value| saturate(value, SHAPE.word as u32)), valid));
+                self.shifted.map(|(quad, valid)| (quad.map(|value| saturate(value, BLOCK.word as u32)), valid));
             self.words = rounded.map(|(quad, _)| quad.map(|(word, _)| word));
             self.clipped = rounded.map(|(quad, valid)| quad.iter().filter(|(_, clipped)| *clipped && valid).count());
             self.shifted = self.taken.map(|(quad, shift, valid)| (quad.map(|value| round_shift(value, shift)), valid));
             let (shift, row, bits) = match inputs[2].number() {
-                1 => (inputs[3].number() as u32, inputs[4], SHAPE.acc),
-                _ => (SHAPE.a_shift, inputs[5], SHAPE.lane),
+                1 => (inputs[3].number() as u32, inputs[4], BLOCK.acc),
+                _ => (BLOCK.a_shift, inputs[5], BLOCK.lane),
             };
             let quad = [0, 1, 2, 3].map(|lane| row.signed(lane, bits));
             self.taken = Some((quad, shift, inputs[1].number() == 1));
@@ -182,18 +182,18 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(12);
         let mut inputs = |cycle: usize| {
             // Accumulators of all lengths, and some that round to just beyond the range.
-            let shift = random.u64(..SHAPE.acc as u64 - 1);
+            let shift = random.u64(..BLOCK.acc as u64 - 1);
             let mut code = |bits: usize| match random.u8(..4) {
                 0 => random_word(&mut random, bits).signed(0, bits),
-                1 => ((1 << (SHAPE.word - 1)) << SHAPE.a_shift) - random.i64(..1 << SHAPE.a_shift),
+                1 => ((1 << (BLOCK.word - 1)) << BLOCK.a_shift) - random.i64(..1 << BLOCK.a_shift),
                 _ => random_word(&mut random, bits).signed(0, bits) >> random.u32(..bits as u32),
             };
             let mut quad = |bits: usize| Word::of_fields(&[(); 4].map(|()| code(bits)), bits);
-            let (raw, quad) = (quad(SHAPE.acc), quad(SHAPE.lane));
+            let (raw, quad) = (quad(BLOCK.acc), quad(BLOCK.lane));
             let clear = cycle < 6 || random.u16(..500) == 0;
             vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), raw, quad]
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(&mut inputs).collect();
-        check(&kernel_of(&SHAPE), &stimulus, &mut Quads::default());
+        check(&kernel_of(&BLOCK), &stimulus, &mut Quads::default());
     }
 }

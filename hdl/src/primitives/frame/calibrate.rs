@@ -213,7 +213,7 @@ pub(crate) mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    /// Drifts and steps of the taxels, and what the frames so far have told.
+    /// Drifts and steps of the taxels, and what the frames so far have shown.
     struct Drift {
         zero: RunningZero,
         moved: Vec<i64>,
@@ -242,13 +242,13 @@ pub(crate) mod tests {
             self.steps[taxel] = if dead { 0 } else { rest.min(limit).max(-limit) };
             self.pressed |= !dead && load(off) > limit && load(rest) > limit;
             self.limited[0] |= moved.abs() == limit * unit;
-            let told = self.limited[1];
+            let limited = self.limited[1];
             if end || early {
                 self.rests = end && !self.pressed;
-                self.limited = [false, if end { self.limited[0] } else { told }];
+                self.limited = [false, if end { self.limited[0] } else { limited }];
                 self.pressed = false;
             }
-            (rest, told)
+            (rest, limited)
         }
     }
 

@@ -258,7 +258,7 @@ impl Load {
 
         self.write(k, &io, ends_word, (*index, words), (*image, *word));
         self.begin_anew(&io, *writing, array);
-        self.keep(k, &io, array, *word, at, [right_head, done, refused.of(io.sent_array)]);
+        self.store_states(k, &io, array, *word, at, [right_head, done, refused.of(io.sent_array)]);
     }
 
     /// Writes the tables: entries of taxels and coefficients, from words of an image in their order, of which there are `words`.
@@ -295,7 +295,7 @@ impl Load {
 
     /// Threshold, noise floor, version and state of the tables: from word n of an image of `array`, which is `word` when `at(n)`.
     /// Then whether its first word is right, whether it ends whole, whether the last one of `sent_array` was refused.
-    fn keep<'k>(
+    fn store_states<'k>(
         &self,
         k: &'k Builder,
         io: &LoadPorts<Inside<'k>>,
@@ -305,15 +305,15 @@ impl Load {
         [right_head, done, refused]: [Expr<'k>; 3],
     ) {
         k.comment("Memories of a word for each array: a reset leaves them as they are.");
-        let kept = |name: &str, bits: usize, value: &dyn Fn(&Tables) -> u64| -> MemoryPort {
+        let array_memory = |name: &str, bits: usize, value: &dyn Fn(&Tables) -> u64| -> MemoryPort {
             let words = self.tables.iter().map(value).enumerate().collect();
             k.memory(name, self.arrays.count(), bits, Contents::Words(words))
         };
         let place = |array: Expr<'k>| if self.arrays.bits == 0 { k.constant(1, 0) } else { array };
-        let thresholds = kept("thresholds", THRESHOLD_BITS, &|tables| tables.threshold.into());
-        let floors = kept("noise_floors", self.floor_bits, &|tables| tables.noise_floor as u64);
+        let thresholds = array_memory("thresholds", THRESHOLD_BITS, &|tables| tables.threshold.into());
+        let floors = array_memory("noise_floors", self.floor_bits, &|tables| tables.noise_floor as u64);
         let whole_version = |tables: &Tables| 1 << VERSION_BITS | u64::from(tables.version);
-        let states = kept("states", 1 + VERSION_BITS as usize, &whole_version);
+        let states = array_memory("states", 1 + VERSION_BITS as usize, &whole_version);
         let state = k.wire("state", states.read(place(io.sent_array)));
         let whole = state.top();
 

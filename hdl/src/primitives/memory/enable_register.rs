@@ -4,18 +4,18 @@ use crate::block;
 use crate::language::{Block, Builder, Inside};
 
 block! {
-    /// `kept` is the value of `word` at the last clock edge at which `keep` was high.
+    /// `held` is the value of `word` at the last clock edge at which `enable` was high.
     pub struct EnableRegister {
         bits: usize,
     }
     ports EnableRegisterPorts {
         clock;
-        /// Enable: store `word` at the clock edge.
-        in keep;
-        /// The word to store; valid with `keep`.
+        /// Store `word` at the clock edge.
+        in enable;
+        /// The word to store; valid with `enable`.
         in word: bits;
-        /// Stored word, from the cycle after `keep`; undefined before the first.
-        out kept: bits;
+        /// Stored word, from the cycle after `enable`; undefined before the first.
+        out held: bits;
     }
 }
 
@@ -28,8 +28,8 @@ impl EnableRegister {
 
 impl Block for EnableRegister {
     fn build<'k>(&self, k: &'k Builder, io: EnableRegisterPorts<Inside<'k>>) {
-        let kept = io.kept.register();
-        k.when(io.keep, || kept.set(io.word));
+        let held = io.held.register();
+        k.when(io.enable, || held.set(io.word));
     }
 }
 
@@ -40,9 +40,9 @@ mod tests {
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
 
-    struct Kept(Option<Word>);
+    struct Held(Option<Word>);
 
-    impl Reference for Kept {
+    impl Reference for Held {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             vec![self.0]
         }
@@ -55,6 +55,6 @@ mod tests {
     #[test]
     fn a_word_stays_until_the_next() {
         let block = EnableRegister::new(70);
-        check(&kernel_of(&block), &random_words(1000, &[1, 70]), &mut Kept(None));
+        check(&kernel_of(&block), &random_words(1000, &[1, 70]), &mut Held(None));
     }
 }

@@ -82,7 +82,7 @@ block! {
         /// Synchronous reset, active high; clears the control pipeline only.
         in rst;
         /// Index of the case of the frame being sent; constant from its first `offer` to its last beat.
-        in which: count_bits(counts.len());
+        in case_index: count_bits(counts.len());
         /// A new frame: clears its counts, the contact flag and the saturations.
         in begin_frame;
         /// Stores position, exponents and status of subarray `part` in this cycle.
@@ -209,16 +209,16 @@ impl ForceUnit {
     }
 
     /// The right shift of the subarray `at`, with the value of a taxel.
-    fn shift<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, kept: &Kept<'k>, at: Expr<'k>) -> Shift<'k> {
-        let k = kept.k;
+    fn shift<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, store: &PartStore<'k>, at: Expr<'k>) -> Shift<'k> {
+        let k = store.k;
         let exponents = [("normalise_held", io.normalise), ("rescale_held", io.rescale)];
         let [normalise_held, rescale_held] = exponents.map(|(name, value)| k.delay(name, value));
         let raw_shift = k.wire("raw_shift", (k.constant(8, self.base_shift) + normalise_held - rescale_held).low(8));
         let most = k.constant(SHIFT_BITS, FORCE_SHIFT_MAX.into());
         let limited = most.less(raw_shift).mux(most, raw_shift.low(SHIFT_BITS));
         let shift = k.delay("shift_now", raw_shift.top().mux(k.constant(SHIFT_BITS, 0), limited));
-        let shifts = kept.memory("shifts", SHIFT_BITS);
-        shifts.write(kept.start_2, kept.part_2, shift);
+        let shifts = store.memory("shifts", SHIFT_BITS);
+        shifts.write(store.start_2, store.part_2, shift);
         let shift = k.delay("shift", shifts.read(at));
         Shift { by: shift, rest: k.delay("shift_rest", shift.low(FINE)) }
     }
@@ -226,14 +226,14 @@ impl ForceUnit {
     /// One component of the shear: `value` times the μ of the subarray or label `at`; `position` is that to store.
     fn shear<'k>(
         &self,
-        kept: &Kept<'k>,
+        store: &PartStore<'k>,
         shift: Shift<'k>,
         value: Expr<'k>,
         [position, at]: [Expr<'k>; 2],
     ) -> Component<'k> {
-        let k = kept.k;
-        let words = kept.memory("mu", MU_BITS);
-        words.write(kept.start_2, kept.part_2, self.mu_word(k, position));
+        let k = store.k;
+        let words = store.memory("mu", MU_BITS);
+        words.write(store.start_2, store.part_2, self.mu_word(k, position));
         let mu = k.delay("mu_value", words.read(at).signed());
         Component::new(k, shift.moved(k, "moved", product(k, value, mu).shift_left(1)))
     }
@@ -257,26 +257,26 @@ impl ForceUnit {
     fn flags<'k>(
         &self,
         io: &ForceUnitPorts<Inside<'k>>,
-        kept: &Kept<'k>,
+        store: &PartStore<'k>,
         contact: Expr<'k>,
         balance: Option<Expr<'k>>,
     ) -> Expr<'k> {
-        let k = kept.k;
+        let k = store.k;
         let FrameMarks { frames_bits, limited } = self.marks;
-        let marks = (self.marks != FrameMarks::default()).then(|| kept.status("frames_held", io.frames));
+        let marks = (self.marks != FrameMarks::default()).then(|| store.status("frames_held", io.frames));
         let mut bits = Vec::new();
         bits.extend(self.threshold.is_none().then_some((TABLES, io.incomplete)));
         bits.extend(self.contacts.then_some((MORE_CONTACTS, io.overflow)));
-        bits.extend(self.checks.then(|| (COEFFICIENTS, kept.status("damages", io.damaged))));
+        bits.extend(self.checks.then(|| (COEFFICIENTS, store.status("damages", io.damaged))));
         bits.extend([
             (FRAMING, io.framing),
             (NO_CONTACT, !contact),
-            (FOUND, kept.status("founds", io.found)),
-            (CONDITION, kept.status("conditions", io.condition)),
+            (FOUND, store.status("founds", io.found)),
+            (CONDITION, store.status("conditions", io.condition)),
         ]);
         bits.extend(self.score_limit.map(|limit| {
             let low = io.found & k.signed_constant(self.score_bits, limit).less(io.score.signed());
-            (SCORE_LOW, kept.status("scores_low", low))
+            (SCORE_LOW, store.status("scores_low", low))
         }));
         bits.extend(balance.map(|balance| (NEGATIVE_PRESSURE, balance.top())));
         bits.extend(marks.filter(|_| limited).map(|marks| (ZERO_LIMIT, marks.top())));
@@ -291,7 +291,7 @@ impl ForceUnit {
         let above_case = (FRAMES.low - CASE.low - CASE.bits) as usize;
         all.splice(
             above_case..above_case + CASE.bits as usize,
-            [value_by_case(k, io.which, &self.numbers, CASE.bits as usize)],
+            [value_by_case(k, io.case_index, &self.numbers, CASE.bits as usize)],
         );
         let frames = marks.filter(|_| frames_bits > 0).map_or(k.constant(1, 0), |marks| marks.low(frames_bits));
         concat(&[vec![frames.extend(WORD - FRAMES.low as usize)], all].concat())
@@ -301,19 +301,19 @@ impl ForceUnit {
     fn status<'k>(
         &self,
         io: &ForceUnitPorts<Inside<'k>>,
-        kept: &Kept<'k>,
+        store: &PartStore<'k>,
         beat: Expr<'k>,
         [flags, cycles, force_saturations]: [Expr<'k>; 3],
     ) -> Expr<'k> {
-        let k = kept.k;
+        let k = store.k;
         let position = |name: &str, position| match self.searches {
-            true => word(kept.status(name, position).signed()),
+            true => word(store.status(name, position).signed()),
             false => k.constant(WORD, 0),
         };
         let score = io.found.mux(io.score.signed().extend(WORD), k.signed_constant(WORD, 0));
         let [x, y] = [position("positions_x", io.position_x), position("positions_y", io.position_y)];
-        let [normalise, rescale] = [kept.status("normalises", io.normalise), kept.status("rescales", io.rescale)];
-        let rescale_saturations = kept.status("rescale_saturations", io.saturations);
+        let [normalise, rescale] = [store.status("normalises", io.normalise), store.status("rescales", io.rescale)];
+        let rescale_saturations = store.status("rescale_saturations", io.saturations);
         let first = concat(&[flags, y, x]);
         let normalise = match self.threshold {
             None => {
@@ -322,7 +322,7 @@ impl ForceUnit {
             }
             Some(_) => word(normalise),
         };
-        let second = concat(&[normalise, word(rescale), kept.status("scores", score)]);
+        let second = concat(&[normalise, word(rescale), store.status("scores", score)]);
         let third = concat(&[word(cycles), word(force_saturations), word(rescale_saturations)]);
         k.wire("status", beat.case(&[(1, first), (2, second)], third))
     }
@@ -347,8 +347,8 @@ fn word(value: Expr<'_>) -> Expr<'_> {
     value.extend(WORD).unsigned()
 }
 
-/// What comes with `start` and is stored per subarray.
-struct Kept<'k> {
+/// The memories of a word per subarray, which is stored with `start`.
+struct PartStore<'k> {
     k: &'k Builder,
     start: Expr<'k>,
     part: Expr<'k>,
@@ -360,13 +360,13 @@ struct Kept<'k> {
     at_out: Expr<'k>,
 }
 
-impl<'k> Kept<'k> {
+impl<'k> PartStore<'k> {
     fn new(k: &'k Builder, io: &ForceUnitPorts<Inside<'k>>, parts: usize, at_out: Expr<'k>) -> Self {
         let ForceUnitPorts { start, part, .. } = *io;
         k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
         let start_2 = k.delay("start_2", k.delay("start_1", start));
         let part_2 = k.delay("part_2", k.delay("part_1", part));
-        Kept { k, start, part, start_2, part_2, parts, at_out }
+        PartStore { k, start, part, start_2, part_2, parts, at_out }
     }
 
     /// A memory with one word per subarray.
@@ -384,21 +384,21 @@ impl<'k> Kept<'k> {
 
 impl Block for ForceUnit {
     fn build<'k>(&self, k: &'k Builder, io: ForceUnitPorts<Inside<'k>>) {
-        let (part_bits, bit, asked) = (io.part.bits(), Type::unsigned(1), STEPS - 1);
+        let (part_bits, bit, steps) = (io.part.bits(), Type::unsigned(1), STEPS - 1);
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
-        let offers = k.state("offers", Type::unsigned(asked), io.rst, 0);
-        offers.set(offers.low(asked - 1).concat(io.offer));
+        let offers = k.state("offers", Type::unsigned(steps), io.rst, 0);
+        offers.set(offers.low(steps - 1).concat(io.offer));
         let leaves = k.wire("leaves", offers.top());
-        let beats = travel(k, "beats", io.beat, asked);
+        let beats = travel(k, "beats", io.beat, steps);
         let lanes = travel(k, "lanes", io.lane, READ_STEPS);
-        let parts = travel(k, "parts", io.beat_part, asked);
+        let parts = travel(k, "parts", io.beat_part, steps);
         let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
-        let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
+        let beat_out = k.wire("beat_out", beats.slice(2 * (steps - 1), 2));
         let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
-        let at_out = k.wire("at_out", part_after(asked));
-        let kept = Kept::new(k, &io, largest(&self.counts), at_out);
+        let at_out = k.wire("at_out", part_after(steps));
+        let store = PartStore::new(k, &io, largest(&self.counts), at_out);
 
-        let shift = self.shift(&io, &kept, part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS));
+        let shift = self.shift(&io, &store, part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS));
         let label = lane_of(io.labels, Quads::LANES, lane_value);
         // Two registers: block RAM and multiplier are far apart, and so are the selection of a label and its μ.
         let value = k.delay("selected", lane_of(io.quad, self.lanes, lane_value).signed());
@@ -413,7 +413,7 @@ impl Block for ForceUnit {
                 let at_value =
                     if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
                 let shear = |(name, position): (_, Expr<'k>)| {
-                    Some(k.scope(name, || self.shear(&kept, shift, value, [position.signed(), at_value])))
+                    Some(k.scope(name, || self.shear(&store, shift, value, [position.signed(), at_value])))
                 };
                 [("x", io.position_x), ("y", io.position_y)].map(shear)
             }
@@ -432,12 +432,12 @@ impl Block for ForceUnit {
         let count = k.wire("count", count);
         k.comment("What a force adds to the sum of all is registered beside the result of the threshold.");
         let balance =
-            self.balance.map(|own| (own, k.register("balance", own.ty()), k.delay("weighed", own.weighed(z.word))));
-        let flags = self.flags(&io, &kept, *contact, balance.as_ref().map(|(_, sum, _)| **sum));
-        let status = self.status(&io, &kept, beat_out, [flags, *cycles_held, *force_saturations]);
+            self.balance.map(|rule| (rule, k.register("balance", rule.ty()), k.delay("weighed", rule.weighed(z.word))));
+        let flags = self.flags(&io, &store, *contact, balance.as_ref().map(|(_, sum, _)| **sum));
+        let status = self.status(&io, &store, beat_out, [flags, *cycles_held, *force_saturations]);
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
         let words = beat_out.is(0).mux(force, status);
-        let steps = asked - READ_STEPS;
+        let steps = steps - READ_STEPS;
         let sent = self.tells_labels.then(|| travel(k, "labels_sent", label, steps));
         let sent = sent.map(|sent| sent.slice(self.label_bits * (steps - 1), self.label_bits));
         io.beat_data.delay(sent.map_or(words, |label| label.concat(words)));
@@ -445,7 +445,7 @@ impl Block for ForceUnit {
         valid.set(leaves);
         let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();
         let last = io.last.state(io.rst, 0);
-        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(k, io.which, &ends, part_bits)));
+        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(k, io.case_index, &ends, part_bits)));
 
         let (zero, one) = (k.constant(1, 0), k.constant(1, 1));
         k.when(leaves, || {
@@ -456,14 +456,14 @@ impl Block for ForceUnit {
                 force_saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
                 k.when(below.map_or(presses, |below| presses & !below), || {
                     contact.set(one);
-                    balance.iter().for_each(|(own, sum, weighed)| sum.set(own.sum(**sum, *weighed)));
+                    balance.iter().for_each(|(rule, sum, weighed)| sum.set(rule.sum(**sum, *weighed)));
                 });
             });
         });
         k.when(io.begin_frame, || {
             counting.set(one);
             contact.set(zero);
-            balance.iter().for_each(|(own, sum, _)| sum.set(k.signed_constant(own.ty().bits, 0)));
+            balance.iter().for_each(|(rule, sum, _)| sum.set(k.signed_constant(rule.ty().bits, 0)));
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
     }

@@ -69,7 +69,7 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const SHAPE: LimbSum = LimbSum { lane: 33, acc: 40, align: 5 };
+    const BLOCK: LimbSum = LimbSum { lane: 33, acc: 40, align: 5 };
 
     /// Whether the row of the low limbs has been the last; undefined before the first `clear`.
     struct Rows {
@@ -102,17 +102,17 @@ mod tests {
 
     #[test]
     fn high_limbs_are_added_to_low_limbs() {
-        for align in [SHAPE.align, 0] {
+        for align in [BLOCK.align, 0] {
             let mut random = fastrand::Rng::with_seed(3);
             let mut inputs = |cycle: usize| {
                 let words = |random: &mut fastrand::Rng, bits: usize| {
                     Word::of_fields(&[(); 4].map(|()| random.i64(-(1 << (bits - 1))..1 << (bits - 1))), bits)
                 };
-                let (quad, low) = (words(&mut random, SHAPE.lane), words(&mut random, SHAPE.acc));
+                let (quad, low) = (words(&mut random, BLOCK.lane), words(&mut random, BLOCK.acc));
                 vec![(cycle == 0 || random.u8(..9) == 0).into(), (random.u8(..4) == 0).into(), quad, low]
             };
             let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
-            let shape = LimbSum { align, ..SHAPE };
+            let shape = LimbSum { align, ..BLOCK };
             let complete = (align == 0).then_some(true);
             check(&kernel_of(&shape), &stimulus, &mut Rows { shape, complete, sum: None });
         }

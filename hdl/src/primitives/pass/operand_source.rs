@@ -104,7 +104,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: OperandSource = OperandSource { data: 14, operand: 18, limb: 17, window: 5 };
+    const BLOCK: OperandSource = OperandSource { data: 14, operand: 18, limb: 17, window: 5 };
 
     /// Inputs in the order of the block.
     struct Sources {
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn quads_of_one_stage_at_a_time_pass_on() {
-        let mut sources = Sources { shape: SHAPE, masks: None, next: None };
-        check(&kernel_of(&SHAPE), &stimulus(SHAPE), &mut sources);
+        let mut sources = Sources { shape: BLOCK, masks: None, next: None };
+        check(&kernel_of(&BLOCK), &stimulus(BLOCK), &mut sources);
     }
 }

@@ -15,8 +15,8 @@ block! {
     }
     ports OperandWriterPorts {
         clock;
-        /// Index of the case; constant from the cycle after `clear` until the next.
-        in which: count_bits(lengths.len());
+        /// Index of the section; constant from the cycle after `clear` until the next.
+        in section: count_bits(lengths.len());
         /// Restarts the counts for the next subarray, with priority over `valid`.
         in clear;
         /// A quad of a v_ij arrives in this cycle.
@@ -32,7 +32,7 @@ block! {
 }
 
 impl OperandWriter {
-    /// `lengths[case]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is
+    /// `lengths[section]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is
     /// read from its first quad on, one quad per cycle, while one quad per cycle is written.
     pub fn new(lengths: &[Vec<usize>], streamed: bool) -> Self {
         OperandWriter { lengths: lengths.to_vec(), streamed }
@@ -57,21 +57,21 @@ impl Block for OperandWriter {
         let quad = k.state("quad", Type::unsigned(count_bits(longest)), io.clear, 0);
         let address = io.address.state(io.clear, 0);
         let finished = io.finished.state(io.clear, 0);
-        let is_uniform = |own: &Vec<usize>| own.iter().all(|length| *length == own[0]);
-        let last = if lengths.iter().all(|own| own.len() == vectors && is_uniform(own)) {
-            let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
-            value_by_case(k, io.which, &ends, quad.bits())
+        let is_uniform = |lengths: &Vec<usize>| lengths.iter().all(|length| *length == lengths[0]);
+        let last = if lengths.iter().all(|lengths| lengths.len() == vectors && is_uniform(lengths)) {
+            let ends: Vec<usize> = lengths.iter().map(|lengths| lengths[0] - 1).collect();
+            value_by_case(k, io.section, &ends, quad.bits())
         } else {
-            let own = |own: &Vec<usize>| {
-                let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
+            let last_quads = |lengths: &Vec<usize>| {
+                let lasts: Vec<u64> = lengths.iter().map(|length| *length as u64 - 1).collect();
                 finished.table(quad.bits(), &padded(lasts, finished.bits()))
             };
-            let of_cases: Vec<Expr> = lengths.iter().map(own).collect();
-            expression_by_case(io.which, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
+            let of_cases: Vec<Expr> = lengths.iter().map(last_quads).collect();
+            expression_by_case(io.section, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
         };
         let last_quad = k.wire("last_quad", quad.equals(last));
         let counts: Vec<usize> = lengths.iter().map(Vec::len).collect();
-        let all = finished.equals(value_by_case(k, io.which, &counts, finished.bits()));
+        let all = finished.equals(value_by_case(k, io.section, &counts, finished.bits()));
         let full = match streamed {
             true => {
                 let full = k.state("full", Type::unsigned(1), io.clear, 0);

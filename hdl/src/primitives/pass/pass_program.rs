@@ -47,23 +47,23 @@ pub fn programs(model: &Model) -> Vec<(&CasePlan, Section)> {
 
 /// The steps of a section: its [instructions](dermis_golden::fixed::plan::program).
 fn unroll((case, section): &(&CasePlan, Section)) -> Vec<Step> {
-    let step = |own: Instruction| Step {
-        coefficients: own.coefficients,
-        columns: own.columns,
-        operand: own.operand,
-        kind: match own.product.operand {
+    let step = |instruction: Instruction| Step {
+        coefficients: instruction.coefficients,
+        columns: instruction.columns,
+        operand: instruction.operand,
+        kind: match instruction.product.operand {
             Operand::InputHigh => 1,
             Operand::InputLow => 2,
             Operand::One => 3,
             _ => 0,
         },
-        flip: own.product.matrix.flip as u64,
-        transposed: own.product.transposed,
-        factor: own.product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
-        layer: matches!(own.target, Target::Layer(_)),
-        last: own.last,
+        flip: instruction.product.matrix.flip as u64,
+        transposed: instruction.product.transposed,
+        factor: instruction.product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
+        layer: matches!(instruction.target, Target::Layer(_)),
+        last: instruction.last,
         ends: false,
-        needs: own.needs,
+        needs: instruction.needs,
     };
     let mut steps: Vec<Step> = instructions(case, section).into_iter().map(step).collect();
     if let Some(step) = steps.last_mut() {
@@ -82,7 +82,7 @@ block! {
     /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is
     /// read.
     ///
-    /// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge.
+    /// `start` loads the first step of `section` ([`programs`]), `advance` the next one, both at the clock edge.
     /// `ready` (the step's operand can be read, and the pause after an accumulation is over), `last` (its last column)
     /// and `ends` (the last step of the section, after which the first follows) are combinational.
     ///
@@ -110,7 +110,7 @@ block! {
     ports PassProgramPorts {
         clock;
         /// Index of the section; valid with `start`, constant until its last step.
-        in which: count_bits(steps.len());
+        in section: count_bits(steps.len());
         /// Load the first step at the clock edge.
         in start;
         /// Load the next step at the clock edge.
@@ -233,12 +233,12 @@ impl PassProgram {
         all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
     }
 
-    /// The instruction at index `asked` of section `which`; zeros beyond the last.
-    fn table<'k>(&self, k: &'k Builder, which: Expr<'k>, asked: Expr<'k>) -> Expr<'k> {
+    /// The instruction at index `asked` of `section`; zeros beyond the last.
+    fn table<'k>(&self, k: &'k Builder, section: Expr<'k>, asked: Expr<'k>) -> Expr<'k> {
         let (length, bits) = (1 << asked.bits(), self.fields().iter().sum());
         let (index, cases) = match self.steps.len() {
             1 => (asked, 1),
-            _ => (which.concat(asked), 1 << which.bits()),
+            _ => (section.concat(asked), 1 << section.bits()),
         };
         let mut words = vec![0; cases * length];
         for (case, steps) in self.steps.iter().enumerate() {
@@ -302,7 +302,7 @@ impl Block for PassProgram {
             unreachable!("one register per field")
         };
         let asked = k.wire("asked", (io.start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
-        let instruction = self.table(k, io.which, asked);
+        let instruction = self.table(k, io.section, asked);
         k.when(io.start | io.advance, || {
             step.set(asked);
             let mut at = 0;

@@ -26,7 +26,7 @@ block! {
         /// Synchronous reset, active high; clears the control pipeline only.
         in rst;
         /// Index of the case; constant while a frame is searched.
-        in which: count_bits(taxels.len());
+        in case_index: count_bits(taxels.len());
         /// Start with the nine candidates of `sweep`.
         in start;
         /// Word of the sweep (`Fields`); valid with `start`.
@@ -124,7 +124,7 @@ impl Block for ScoreBias {
                 let all: Vec<[Expr; 2]> = taxels.iter().map(|&taxels| halves(k, taxels, log, w)).collect();
                 let half = |n: usize| {
                     let of: Vec<Expr> = all.iter().map(|halves| halves[n]).collect();
-                    expression_by_case(io.which, &of).unwrap_or(k.constant(w, 0))
+                    expression_by_case(io.case_index, &of).unwrap_or(k.constant(w, 0))
                 };
                 let weight = (k.delay("first", half(0)) + k.delay("rest", half(1))).low(w);
                 for row in 0..3 {
@@ -232,8 +232,8 @@ mod tests {
                 let radius = (square + random.i64(-20..20)).max(0) as u64;
                 let sum = |_| random.i64(..) >> random.usize(64 - SUM_BITS..64);
                 let sums: Vec<i64> = (0..9).map(sum).collect();
-                let which = random.u64(..TAXELS.len() as u64);
-                given = vec![which.into(), sweep.word(), radius.into(), Word::of_fields(&sums, SUM_BITS)];
+                let case_index = random.u64(..TAXELS.len() as u64);
+                given = vec![case_index.into(), sweep.word(), radius.into(), Word::of_fields(&sums, SUM_BITS)];
             }
             vec![rst.into(), given[0], start.into(), given[1], given[2], given[3]]
         };

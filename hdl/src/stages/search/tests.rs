@@ -128,7 +128,7 @@ impl Reference for Searching<'_> {
     }
 
     fn clock(&mut self, inputs: &[Word]) {
-        let [rst, which, _, _, fill, index, address, start, enabled, ready] =
+        let [rst, case_index, _, _, fill, index, address, start, enabled, ready] =
             [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|input| inputs[input].number() as usize);
         if fill == 1 {
             let bits = self.model.formats().vector_bits as usize + 2;
@@ -136,7 +136,7 @@ impl Reference for Searching<'_> {
             quad.iter_mut().enumerate().for_each(|(lane, taxel)| taxel[index] = inputs[3].signed(lane, bits));
         }
         if start == 1 {
-            self.case = which;
+            self.case = case_index;
             self.start(enabled == 1);
         } else if self.waits() && ready == 1 {
             self.last = Some(Last::SetUp(self.cycle + 1));
@@ -210,7 +210,7 @@ fn sweeps_and_values_are_those_of_the_model() {
             subject_of!(
                 Search::of_model(&model).unwrap(),
                 changes,
-                inputs [rst, which, fill_which, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
+                inputs [rst, case_index, fill_case, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
                 outputs [
                     stalled, values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared,
                     taken,

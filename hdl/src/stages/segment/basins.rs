@@ -23,7 +23,7 @@ const OTHER: u64 = 3;
 const BEST: u64 = 5;
 const MERGED: u64 = 6;
 /// Tick of `LEAST` in which the last load has been compared.
-const TOLD: u64 = 3;
+const COMPARED: u64 = 3;
 
 /// Registers of the tables alone.
 pub(super) struct List<'k> {
@@ -54,7 +54,7 @@ pub(super) struct List<'k> {
 impl<'k> Circuit<'k> {
     /// The pairs of a basin with a small load begin with their saddles.
     pub(super) fn begin_pairs(&self, list: &List<'k>) {
-        self.begin(self.at(LEAST, TOLD) & !*list.ranks & *list.found, FIRST);
+        self.begin(self.at(LEAST, COMPARED) & !*list.ranks & *list.found, FIRST);
     }
 
     /// Every number of a basin is in the list.
@@ -78,7 +78,7 @@ impl<'k> Circuit<'k> {
         let unlinks = k.wire("unlinks", self.is(JOIN) & follows.equals(*gone));
         let next = k.delay("next", unlinks.mux(*after, follows));
         let unlinks = k.delay("unlinked", unlinks);
-        let [best, hold] = ["best", "hold"].map(|name| register(name, self.shape.smoothed));
+        let [best, hold] = ["best", "hold"].map(|name| register(name, self.params.smoothed));
         let list = List { outer, into, gone, found, small, ranks, best, hold, follows, next, unlinks, after };
         self.saddles(order, &list);
         let less = self.loads(&list);
@@ -89,7 +89,7 @@ impl<'k> Circuit<'k> {
 
     /// The saddles and the bars; which pair is to be joined.
     fn saddles(&self, order: &Order<'k>, list: &List<'k>) {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         let one = k.constant(1, 1);
         k.comment("Saddles");
         let basin = self.memories.steps_out.low(BASIN);
@@ -101,7 +101,7 @@ impl<'k> Circuit<'k> {
         let meets = k.wire("meets", differs & stall.is(0));
 
         let (other_tick, merged) = (self.at(JOIN, OTHER), self.at(JOIN, MERGED));
-        let (told, starts) = (self.at(LEAST, TOLD), self.at(JOIN, 2));
+        let (compared, starts) = (self.at(LEAST, COMPARED), self.at(JOIN, 2));
         let pairs = meets | self.at(PAIRS, HIGHER) | self.at(PAIRS, SADDLE) | other_tick | merged;
         let diagonal = k.wire("diagonal", self.lower.equals(*self.higher));
         let (clears, climbs) = (self.is(CLEAR), self.is(CLIMB));
@@ -113,27 +113,27 @@ impl<'k> Circuit<'k> {
             (clears & !diagonal, self.lower.plus(1)),
         ]);
         // The list begins with 0, so do the counters of the steps that follow.
-        k.when(pairs | clears | told | starts | climbs, || self.lower.set(lower));
+        k.when(pairs | clears | compared | starts | climbs, || self.lower.set(lower));
         let counts = self.among(&[CLEAR, SETTLE]);
         let higher = select(&[
             (self.is(BORDERS), basin),
             (self.is(PAIRS) | merged, list.next),
             (other_tick, *self.cursor),
-            (told & !*list.ranks | starts, *list.gone),
+            (compared & !*list.ranks | starts, *list.gone),
             (counts, self.higher.plus(1)),
         ]);
         let counted = clears & diagonal | self.at(SETTLE, 1);
-        k.when(pairs | counted | told | starts | climbs, || self.higher.set(higher));
+        k.when(pairs | counted | compared | starts | climbs, || self.higher.set(higher));
 
         let turned = k.wire("turned", self.higher.less(*self.lower));
         let lower = k.wire("lower_ordered", turned.mux(*self.higher, *self.lower));
         let higher = k.wire("higher_ordered", turned.mux(*self.lower, *self.higher));
         let place = lower.concat(higher);
-        let memory = k.memory("saddles", TABLE * TABLE, shape.smoothed, Contents::Undefined).unchecked();
+        let memory = k.memory("saddles", TABLE * TABLE, params.smoothed, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Saddles);
         let saddle = k.delay("saddle", k.delay("saddle_read", memory.read(place)));
         let larger = k.wire("larger", list.best.less(saddle));
-        let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
+        let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(params.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
         let least =
             k.delay("is_less", self.multiplier.difference.top()).mux(self.memories.words_out, *self.multiplier.base);
@@ -166,8 +166,8 @@ impl<'k> Circuit<'k> {
     /// The loads, and the sums of the contacts: whether one is less than what is held. A sum is there two cycles after its
     /// place is chosen, and may be written then.
     fn loads(&self, list: &List<'k>) -> Expr<'k> {
-        let (k, shape) = (self.k, self.shape);
-        let contact = count_bits(shape.most);
+        let (k, params) = (self.k, self.params);
+        let contact = count_bits(params.most);
         k.comment("Loads and sums");
         let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
         // In LABEL 0, 1, 2 at the ticks 1, 2, 3; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
@@ -191,8 +191,8 @@ impl<'k> Circuit<'k> {
         let begins = k.wire("begins_list", scans & !place.any());
         let takes = k.wire("takes_load", scans & place.any() & (less ^ *list.ranks));
         k.when(begins | takes | self.at(JOIN, 2) | self.at(MIDDLE, 2), || {
-            let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(shape.sum);
-            held.set(begins.mux(whole & (!*list.ranks).repeat(shape.sum), load));
+            let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(params.sum);
+            held.set(begins.mux(whole & (!*list.ranks).repeat(params.sum), load));
         });
         // Half a unit more makes a comparison one of "at most".
         k.when(begins, || {
@@ -217,11 +217,11 @@ impl<'k> Circuit<'k> {
         let compares = self.is(MIDDLE) & !self.tick.at(0) & self.tick.any();
         let holds = k.delay("holds", compares | self.is(JOIN));
         let subtracts = k.delay("subtracts", compares);
-        let held = *held ^ subtracts.repeat(shape.sum);
-        let addend = holds.mux(held, self.multiplier.product.resize(shape.sum));
-        let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
+        let held = *held ^ subtracts.repeat(params.sum);
+        let addend = holds.mux(held, self.multiplier.product.resize(params.sum));
+        let total = k.wire("load_total", (load + addend + subtracts).low(params.sum));
         // A moment is not read again when it is less than what is held.
-        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));
+        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(params.sum));
         less
     }
 
@@ -240,10 +240,10 @@ impl<'k> Circuit<'k> {
         k.when(scans, || {
             tick.set(zero(3).concat(!list.follows.any()));
         });
-        let told = self.at(LEAST, TOLD);
-        self.enter(told & ranks & found, [LEAST, TAKE], || ());
-        self.enter(told & ranks & !found, [LEAST, SETTLE], || ());
-        self.enter(told & !ranks, [LEAST, PAIRS], || {
+        let compared = self.at(LEAST, COMPARED);
+        self.enter(compared & ranks & found, [LEAST, TAKE], || ());
+        self.enter(compared & ranks & !found, [LEAST, SETTLE], || ());
+        self.enter(compared & !ranks, [LEAST, PAIRS], || {
             list.small.set(found);
             list.found.set(zero(1));
             list.outer.set(*list.gone);
@@ -273,7 +273,7 @@ impl<'k> Circuit<'k> {
         });
         self.enter(merged & ends, [JOIN, LEAST], || ());
 
-        let full = self.kept.is(self.shape.most as u64);
+        let full = self.kept.is(self.params.most as u64);
         self.enter(self.at(TAKE, 1), [TAKE, LEAST], || {
             self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
         });
@@ -282,7 +282,7 @@ impl<'k> Circuit<'k> {
         let others = self.at(PAIRS, HIGHER) | saddle;
         let follows = scans | self.at(SETTLE, 0) & !self.chain_out.top();
         let nexts = self.at(PAIRS, LOWER) | others | merged;
-        let gone = told & ranks & found | judges & found;
+        let gone = compared & ranks & found | judges & found;
         let zeros = joins | judges & !found | self.at(JOIN, 2) | self.at(TAKE, 1);
         let (into, settles, labels) = (self.at(JOIN, 0), self.at(SETTLE, 1), self.is(LABEL));
         // The next one is 0 at the end of the list.

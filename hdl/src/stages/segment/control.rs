@@ -6,7 +6,7 @@ use dermis_golden::estimate::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::segment::cycles::TAP_BITS;
 
-use super::shape::Shape;
+use super::params::SegmentParams;
 use super::SegmentPorts;
 use crate::language::{concat, Builder, Contents, Expr, Inside, MemoryPort, Net, Type};
 use crate::primitives::count_bits;
@@ -65,7 +65,7 @@ const STATES: [&str; 15] = [
 /// Registers and memories that more than one part reads or sets.
 pub(super) struct Circuit<'k> {
     pub(super) k: &'k Builder,
-    pub(super) shape: &'k Shape,
+    pub(super) params: &'k SegmentParams,
     pub(super) io: SegmentPorts<Inside<'k>>,
     state: [Net<'k>; STATES.len()],
     /// When a state ends.
@@ -147,8 +147,8 @@ pub(super) struct Multiplier<'k> {
 
 impl<'k> SegmentPorts<Inside<'k>> {
     /// The circuit between the ports.
-    pub(super) fn circuit(self, k: &'k Builder, shape: &'k Shape) {
-        let circuit = Circuit::new(k, shape, self);
+    pub(super) fn circuit(self, k: &'k Builder, params: &'k SegmentParams) {
+        let circuit = Circuit::new(k, params, self);
         let order = circuit.order();
         let list = circuit.tables(&order);
         circuit.labels(&order);
@@ -169,20 +169,20 @@ fn later<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
 /// The quads that come in: address of the one that is read; whether the word of a `lane` is taken, and that word.
 fn unpack<'k>(
     k: &'k Builder,
-    shape: &Shape,
+    params: &SegmentParams,
     io: &SegmentPorts<Inside<'k>>,
     lane: Expr<'k>,
     picks: Expr<'k>,
 ) -> (Net<'k>, Expr<'k>, Expr<'k>) {
     k.comment("Quads of words, each with its sign; the word of a lane");
     let narrow = |lane: usize| {
-        let value = io.fill_quad.slice(lane * shape.lane, shape.lane).signed();
-        let value = value.resize(value.bits().max(shape.low + WORD + 1)).unsigned();
-        value.top().concat(value.slice(shape.low, WORD))
+        let value = io.fill_quad.slice(lane * params.lane, params.lane).signed();
+        let value = value.resize(value.bits().max(params.low + WORD + 1)).unsigned();
+        value.top().concat(value.slice(params.low, WORD))
     };
-    let quads = memory(k, "quads", shape.quad_count(), 4 * (WORD + 1), Holds::SegmentQuads);
+    let quads = memory(k, "quads", params.quad_count(), 4 * (WORD + 1), Holds::SegmentQuads);
     quads.write(io.fill, io.fill_address, concat(&[3, 2, 1, 0].map(narrow)));
-    let quad = k.register("quad", Type::unsigned(count_bits(shape.quad_count())));
+    let quad = k.register("quad", Type::unsigned(count_bits(params.quad_count())));
     let quads_out = later(k, "quads", quads.read(*quad));
     let lanes: Vec<(u64, Expr)> =
         (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
@@ -195,10 +195,10 @@ fn unpack<'k>(
 
 impl<'k> Memories<'k> {
     /// Words and steps are read at `point`, where the reading `moves` on.
-    fn new(k: &'k Builder, shape: &Shape, moves: Expr<'k>, point: Expr<'k>) -> Self {
-        let entry = shape.smoothed.max(BASIN + 1);
-        let words = memory(k, "words", shape.taxels(), shape.smoothed, Holds::Smoothed);
-        let steps = memory(k, "steps", shape.taxels(), entry, Holds::Steps);
+    fn new(k: &'k Builder, params: &SegmentParams, moves: Expr<'k>, point: Expr<'k>) -> Self {
+        let entry = params.smoothed.max(BASIN + 1);
+        let words = memory(k, "words", params.taxels(), params.smoothed, Holds::Smoothed);
+        let steps = memory(k, "steps", params.taxels(), entry, Holds::Steps);
         let read = |name: &str, memory: &MemoryPort<'k>, bits: usize| {
             let register = |stage: &str| k.register(&format!("{name}_{stage}"), Type::unsigned(bits));
             let [read, out] = ["read", "out"].map(register);
@@ -208,9 +208,9 @@ impl<'k> Memories<'k> {
             });
             *out
         };
-        let words_out = read("words", &words, shape.smoothed);
+        let words_out = read("words", &words, params.smoothed);
         let steps_out = read("steps", &steps, entry);
-        let (weights, mut flags): (Vec<u64>, Vec<u64>) = shape.taps.concat().into_iter().unzip();
+        let (weights, mut flags): (Vec<u64>, Vec<u64>) = params.taps.concat().into_iter().unzip();
         let tap = k.register("tap", Type::unsigned(count_bits(weights.len())));
         let contents = Contents::Words(weights.iter().copied().enumerate().collect());
         let windows = k.memory("windows", weights.len(), TAP_BITS, contents).style("block");
@@ -226,7 +226,7 @@ impl<'k> Multiplier<'k> {
     /// Of a `word` or what is in the `memories`, in the state that `is` tells, at the tick, row, column and lane of `place`.
     fn new(
         k: &'k Builder,
-        shape: &Shape,
+        params: &SegmentParams,
         is: &dyn Fn(usize) -> Expr<'k>,
         memories: &Memories<'k>,
         word: Expr<'k>,
@@ -235,26 +235,26 @@ impl<'k> Multiplier<'k> {
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let Memories { words_out, steps_out, tap_flags, weight, .. } = *memories;
         let smooths = k.wire("smooths", is(ALONG_ROWS) | is(ALONG_COLUMNS));
-        let base = register("base", shape.smoothed);
-        let read = word.extend(shape.smoothed);
-        let data = is(ALONG_COLUMNS).mux(steps_out.low(shape.smoothed), is(LABEL).mux(read, words_out));
+        let base = register("base", params.smoothed);
+        let read = word.extend(params.smoothed);
+        let data = is(ALONG_COLUMNS).mux(steps_out.low(params.smoothed), is(LABEL).mux(read, words_out));
         let difference = k.wire("difference", (data - *base).unsigned());
-        let operand = register("operand", shape.smoothed + 1);
+        let operand = register("operand", params.smoothed + 1);
         k.when(!is(BORDERS) | tick.is(3), || operand.set(difference));
         let weight = k.delay("weight2", k.delay("weight1", weight));
-        let factor = k.delay("factor", factor(k, shape, is, [tick, weight, row, col, lane]));
-        let product = register("product", shape.smoothed + 1 + FACTOR);
+        let factor = k.delay("factor", factor(k, params, is, [tick, weight, row, col, lane]));
+        let product = register("product", params.smoothed + 1 + FACTOR);
         product.set((operand.signed() * factor.extend(FACTOR + 1).signed()).low(product.bits()));
         // A tap's flags, when its product is there.
         let flags = k.delay("flags1", tap_flags);
         let flags = (2..=4).fold(flags, |flags, stage| k.delay(&format!("flags{stage}"), flags));
-        let sum = shape.smoothed + FRACTION;
+        let sum = params.smoothed + FRACTION;
         let partial = register("partial", sum);
         let total = k.wire("total", (*partial + product.low(sum)).low(sum));
         let adds = k.wire("sums", smooths & (tick.at(3) | tick.slice(1, 2).all()));
         let rounding = smooths.mux(k.constant(sum, HALF), k.constant(sum, BAR_ROUNDING));
         partial.set((adds & !flags.at(0)).mux(total, rounding));
-        let result = k.delay("result", total.slice(FRACTION, shape.smoothed));
+        let result = k.delay("result", total.slice(FRACTION, params.smoothed));
         let ready = k.delay("ready", adds & flags.at(0));
         // Not the word that follows the last one of an axis into the next step.
         let smoothed = k.wire("smoothed", ready & tick.any());
@@ -264,8 +264,8 @@ impl<'k> Multiplier<'k> {
 }
 
 impl<'k> Circuit<'k> {
-    fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
-        let taxel = count_bits(shape.taxels());
+    fn new(k: &'k Builder, params: &'k SegmentParams, io: SegmentPorts<Inside<'k>>) -> Self {
+        let taxel = count_bits(params.taxels());
         let rst = io.rst;
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let state =
@@ -277,11 +277,11 @@ impl<'k> Circuit<'k> {
         let is = |step: usize| *state[step];
 
         let picks = is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(3);
-        let (quad, picks, word) = unpack(k, shape, &io, *lane, picks);
-        let memories = Memories::new(k, shape, *moves, *point);
+        let (quad, picks, word) = unpack(k, params, &io, *lane, picks);
+        let memories = Memories::new(k, params, *moves, *point);
         k.comment("Multiplier and the sum of its products");
-        let (row, col) = (register("row", count_bits(shape.rows)), register("col", count_bits(shape.cols)));
-        let multiplier = Multiplier::new(k, shape, &is, &memories, word, [*tick, *row, *col, *lane]);
+        let (row, col) = (register("row", count_bits(params.rows)), register("col", count_bits(params.cols)));
+        let multiplier = Multiplier::new(k, params, &is, &memories, word, [*tick, *row, *col, *lane]);
 
         let table = |name: &str, bits: usize, holds: Holds| memory(k, name, TABLE, bits, holds);
         let chain = table("chain", BASIN + 1, Holds::BasinLinks);
@@ -289,7 +289,7 @@ impl<'k> Circuit<'k> {
         let chain_out = k.wire("chain_out", chain.read(*cursor));
         Circuit {
             k,
-            shape,
+            params,
             state,
             leaves: RefCell::default(),
             tick,
@@ -314,7 +314,7 @@ impl<'k> Circuit<'k> {
             kept: io.count.register(),
             overflow: io.overflow.register(),
             done: io.done.state(rst, 0),
-            label: register("label", count_bits(shape.most)),
+            label: register("label", count_bits(params.most)),
             adds: register("adds", 1),
             own: register("own", BASIN),
             lower: register("lower", BASIN),
@@ -322,8 +322,8 @@ impl<'k> Circuit<'k> {
             cursor,
             chain,
             chain_out,
-            loads: table("loads", shape.sum, Holds::Loads),
-            bars: table("bars", shape.smoothed, Holds::SaddleThresholds),
+            loads: table("loads", params.sum, Holds::Loads),
+            bars: table("bars", params.smoothed, Holds::SaddleThresholds),
             io,
         }
     }
@@ -395,12 +395,12 @@ pub(super) fn select<'k>(values: &[(Expr<'k>, Expr<'k>)]) -> Expr<'k> {
 /// weight of a contact, an odd number for its moments.
 fn factor<'k>(
     k: &'k Builder,
-    shape: &Shape,
+    params: &SegmentParams,
     is: &dyn Fn(usize) -> Expr<'k>,
     [tick, weight, row, col, lane]: [Expr<'k>; 5],
 ) -> Expr<'k> {
     let constant = |value: u64| k.constant(FACTOR, value);
-    let [x, y, diagonal] = shape.slopes.map(constant);
+    let [x, y, diagonal] = params.slopes.map(constant);
     let slopes = [(5, y), (7, x), (8, x), (0, y), (2, constant(BAR))];
     // The factors of a taxel stay until its products are there, when the next one has been chosen.
     let odd = |name: &str, line: Expr<'k>, lines: usize, far: Expr<'k>| {
@@ -410,8 +410,8 @@ fn factor<'k>(
         k.when(tick.is(3), || factor.set(odd));
         factor.resize(FACTOR)
     };
-    let moments = [(1, constant(2)), (2, odd("row_factor", row, shape.rows, lane.at(1)))];
-    let moment = tick.case(&moments, odd("col_factor", col, shape.cols, lane.at(0)));
+    let moments = [(1, constant(2)), (2, odd("row_factor", row, params.rows, lane.at(1)))];
+    let moment = tick.case(&moments, odd("col_factor", col, params.cols, lane.at(0)));
     select(&[
         (is(ALONG_ROWS) | is(ALONG_COLUMNS), weight),
         (is(CLIMB), tick.case(&slopes, diagonal)),

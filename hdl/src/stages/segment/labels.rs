@@ -14,7 +14,7 @@ const COLUMN: u64 = 8;
 impl<'k> Circuit<'k> {
     /// The contact of each taxel, and the labels of the quads.
     pub(super) fn labels(&self, order: &Order<'k>) {
-        let (k, bits) = (self.k, self.shape.label());
+        let (k, bits) = (self.k, self.params.label());
         k.comment("Labels");
         let found = self.chain_out.low(bits);
         let before = k.register("labels_before", Type::unsigned(3 * bits));
@@ -28,7 +28,7 @@ impl<'k> Circuit<'k> {
             before.set(quad.slice(bits, 3 * bits));
         });
         k.when(self.settled(), || self.adds.set(self.zero(1)));
-        let memory = k.memory("label_quads", self.shape.quad_count(), 4 * bits, Contents::Undefined).unchecked();
+        let memory = k.memory("label_quads", self.params.quad_count(), 4 * bits, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Labels);
         let whole = k.delay("label_quad_ends", self.is(LABEL) & order.quads_end);
         memory.write(whole, k.delay("label_quad_address", *self.quad), quad);
@@ -43,12 +43,12 @@ impl<'k> Circuit<'k> {
     /// The middles, and the end. The sum of a contact was `less` than what is held, twice its weight, or is written again.
     pub(super) fn middles(&self, less: Expr<'k>) {
         let (k, tick) = (self.k, self.tick);
-        let bits = count_bits(self.shape.most);
+        let bits = count_bits(self.params.most);
         k.comment("Middles");
         let less = k.delay("was_less", less);
         let (row, column) = (self.at(MIDDLE, ROW), self.at(MIDDLE, COLUMN));
         let last = |lines: usize| self.line.is(lines as u64 - 1);
-        let ends = row.mux(last(self.shape.rows), last(self.shape.cols)) | less;
+        let ends = row.mux(last(self.params.rows), last(self.params.cols)) | less;
         let ends = k.wire("line_found", ends);
         k.when(self.is(MIDDLE), || tick.set(tick.plus(1)));
         self.turn(row & !ends, ROW - 1);
@@ -62,7 +62,7 @@ impl<'k> Circuit<'k> {
         self.done.set(done);
         let outputs = [(self.io.middle_row, "middle_rows", self.row), (self.io.middle_col, "middle_cols", self.col)];
         for (axis, (output, name, lines)) in outputs.into_iter().enumerate() {
-            let memory = k.memory(name, self.shape.most, lines.bits(), Contents::Undefined).unchecked();
+            let memory = k.memory(name, self.params.most, lines.bits(), Contents::Undefined).unchecked();
             let memory = memory.holds(Holds::Middles(axis));
             let writes = [row, column][axis] & ends;
             memory.write(writes, self.higher.low(bits), self.line.low(lines.bits()));

@@ -68,7 +68,7 @@ fn offsets(cols: usize, bits: usize) -> Vec<u64> {
 impl<'k> Circuit<'k> {
     /// The taxels of all steps, in their order.
     pub(super) fn order(&self) -> Order<'k> {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         let starts = self.sequence();
         let walk = self.advance();
         let (of_lane, unpacks) = self.lanes(walk.col_last);
@@ -77,7 +77,7 @@ impl<'k> Circuit<'k> {
 
         k.when(self.tick.is(3), || self.multiplier.base.set(self.memories.words_out));
         let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2) & *self.moves;
-        k.when(bare, || self.multiplier.base.set(self.zero(shape.smoothed)));
+        k.when(bare, || self.multiplier.base.set(self.zero(params.smoothed)));
         let climbed = self.climb(walk.valids.top());
         self.write(walk.walks & *walk.back & !walk.known, unpacks | self.at(LABEL, 0), of_lane, &climbed);
         let joins = self.ends(starts, &walk, heading);
@@ -93,7 +93,7 @@ impl<'k> Circuit<'k> {
 
     /// Row, column and address of the next quad or taxel.
     fn advance(&self) -> Walk<'k> {
-        let (k, shape, quad_cols) = (self.k, self.shape, self.shape.quads[1]);
+        let (k, params, quad_cols) = (self.k, self.params, self.params.quads[1]);
         let [walking, back] = ["walking", "back"].map(|name| k.register(name, Type::unsigned(1)));
         let window = k.register("window", self.point.ty());
         let valids = k.register("valids", Type::unsigned(5));
@@ -109,19 +109,20 @@ impl<'k> Circuit<'k> {
         let passes = k.wire("passes", known & (*back | !*walking));
         let begins = k.wire("begins", self.at(CLIMB, 9) | self.at(BORDERS, 4) & *self.moves);
         let advances = k.wire("advances", quads_end | begins | *walks & passes);
-        let col_last = in_quads.mux(self.col.is(quad_cols as u64 - 1), self.col.is(shape.cols as u64 - 1));
+        let col_last = in_quads.mux(self.col.is(quad_cols as u64 - 1), self.col.is(params.cols as u64 - 1));
         let col_last = k.wire("col_last", col_last);
         k.when(advances, || {
             self.col.set(col_last.mux(self.zero(self.col.bits()), self.col.plus(1)));
             self.row.set((*self.row + col_last).low(self.row.bits()));
-            let step = (in_quads & col_last).mux(self.taxel(shape.cols - quad_cols + 1), self.taxel(1));
+            let step = (in_quads & col_last).mux(self.taxel(params.cols - quad_cols + 1), self.taxel(1));
             self.address.set((*self.address + step).low(self.address.bits()));
-            let step = col_last.mux(self.taxel(shape.cols + quad_cols - 1), self.taxel((1 << self.address.bits()) - 1));
+            let step =
+                col_last.mux(self.taxel(params.cols + quad_cols - 1), self.taxel((1 << self.address.bits()) - 1));
             self.mirror.set((*self.mirror + step).low(self.address.bits()));
         });
         k.when(quads_end, || self.quad.set(self.quad.plus(1)));
-        let last_taxel = k.delay("last_taxel", self.address.is(shape.taxels() as u64 - 1));
-        let last_quad = k.delay("quads_last", self.quad.is(shape.quad_count() as u64 - 1));
+        let last_taxel = k.delay("last_taxel", self.address.is(params.taxels() as u64 - 1));
+        let last_quad = k.delay("quads_last", self.quad.is(params.quad_count() as u64 - 1));
         let last_quad = k.wire("last_quad", quads_end & last_quad);
         k.when(begins, || {
             self.begun.set(k.constant(1, 1));
@@ -133,17 +134,17 @@ impl<'k> Circuit<'k> {
 
     /// The taxel of the lane of a quad, and whether its word is written.
     fn lanes(&self, col_last: Expr<'k>) -> (Expr<'k>, Expr<'k>) {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         k.comment("Taxel of a lane");
         let far = self.lane.at(1);
         let beside = (far ^ self.lane.at(0)).mux(*self.mirror, *self.address);
         let turned = beside ^ far.repeat(self.address.bits());
-        let all = self.taxel(shape.taxels()) & far.repeat(self.address.bits());
+        let all = self.taxel(params.taxels()) & far.repeat(self.address.bits());
         let of_lane = k.wire("of_lane", (turned + all).low(self.address.bits()));
         let twice = |odd: bool, end: Expr<'k>, far: Expr<'k>| if odd { end & far } else { self.zero(1) };
-        let middle_row = self.row.is(shape.quads[0] as u64 - 1);
+        let middle_row = self.row.is(params.quads[0] as u64 - 1);
         let copies =
-            twice(shape.rows % 2 == 1, middle_row, far) | twice(shape.cols % 2 == 1, col_last, self.lane.at(0));
+            twice(params.rows % 2 == 1, middle_row, far) | twice(params.cols % 2 == 1, col_last, self.lane.at(0));
         let unpacks = k.wire("unpacks", self.is(UNPACK) & self.picks);
         k.when(self.picks, || self.counts.set(!copies));
         k.when(unpacks | self.at(LABEL, 4), || self.lane.set(self.lane.plus(1)));
@@ -156,7 +157,7 @@ impl<'k> Circuit<'k> {
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
         runs.set(smooths & self.tick.any());
-        let [along_row, along_column] = self.shape.tap_counts();
+        let [along_row, along_column] = self.params.tap_counts();
         let wraps = [(along_row - 1, 0), (along_row + along_column - 1, along_row)];
         let wraps = wraps.map(|(end, first)| (end as u64, k.constant(tap.bits(), first as u64)));
         tap.set(smooths.mux(tap.case(&wraps, tap.plus(1)), self.zero(tap.bits())));
@@ -165,7 +166,7 @@ impl<'k> Circuit<'k> {
 
     /// The taxel that is read next, and its direction from the one of the present tick.
     fn read(&self, walk: &Walk<'k>, smooths: Expr<'k>) -> Net<'k> {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         let Walk { walks, known, passes, .. } = *walk;
         let [last, moves, ends] = [0, 1, 2].map(|flag| self.memories.tap_flags.at(flag));
         k.comment("The taxel that is read");
@@ -182,7 +183,7 @@ impl<'k> Circuit<'k> {
         let own = self.is(LABEL).mux(*self.target, *self.address);
         let from = from_window.mux(*walk.window, smooths.mux(*self.point, own));
         let next_to = |from: Expr<'k>, direction: Expr<'k>| {
-            let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
+            let offset = direction.table(self.address.bits(), &offsets(params.cols, self.address.bits()));
             (from + offset).low(self.address.bits())
         };
         // The entry of a walk comes late from its memory: what it says is known is selected behind the sum.
@@ -206,16 +207,16 @@ impl<'k> Circuit<'k> {
 
     /// Whether there is a neighbour in a direction.
     fn within(&self, heading: Expr<'k>) -> Expr<'k> {
-        let shape = self.shape;
+        let params = self.params;
         let needs = |directions: &[usize]| {
             let table: Vec<u64> = (0..16).map(|at| u64::from(directions.contains(&at))).collect();
             heading.table(1, &table)
         };
         let beyond = [
             (vec![1, 2, 3], self.row.is(0)),
-            (vec![6, 7, 8], self.row.is(shape.rows as u64 - 1)),
+            (vec![6, 7, 8], self.row.is(params.rows as u64 - 1)),
             (vec![1, 4, 6], self.col.is(0)),
-            (vec![3, 5, 8], self.col.is(shape.cols as u64 - 1)),
+            (vec![3, 5, 8], self.col.is(params.cols as u64 - 1)),
         ];
         let beyond = beyond.iter().map(|(directions, end)| needs(directions) & *end).reduce(|any, end| any | end);
         heading.any() & !beyond.unwrap_or(self.zero(1))
@@ -223,12 +224,12 @@ impl<'k> Circuit<'k> {
 
     /// Ends of the steps; that of `BORDERS`.
     fn ends(&self, starts: Expr<'k>, walk: &Walk<'k>, heading: Net<'k>) -> Expr<'k> {
-        let (k, shape, tap, cleared) = (self.k, self.shape, self.memories.tap, self.cleared());
+        let (k, params, tap, cleared) = (self.k, self.params, self.memories.tap, self.cleared());
         k.comment("Ends of the steps");
-        let line_last = self.is(ALONG_ROWS).mux(self.line_is(shape.rows), self.line_is(shape.cols));
+        let line_last = self.is(ALONG_ROWS).mux(self.line_is(params.rows), self.line_is(params.cols));
         let smoothed = k.wire("smoothed_all", self.multiplier.smoothed & self.multiplier.line_ends & line_last);
         let joins = k.wire("joins", self.at(BORDERS, 2) & *self.moves & *self.ending);
-        let beyond_last = k.delay("beyond_last", self.address.equals(self.taxel(shape.taxels())));
+        let beyond_last = k.delay("beyond_last", self.address.equals(self.taxel(params.taxels())));
         let ends = [
             (starts, IDLE, UNPACK),
             (self.is(UNPACK) & walk.last_quad, UNPACK, ALONG_ROWS),
@@ -241,7 +242,7 @@ impl<'k> Circuit<'k> {
         ];
         for (end, from, to) in ends {
             self.enter(end, [from, to], || match to {
-                ALONG_COLUMNS => tap.set(k.constant(tap.bits(), shape.tap_counts()[0] as u64)),
+                ALONG_COLUMNS => tap.set(k.constant(tap.bits(), params.tap_counts()[0] as u64)),
                 CLIMB => {
                     [self.count, self.overflow].iter().for_each(|register| register.set(self.zero(register.bits())))
                 }
@@ -270,7 +271,7 @@ impl<'k> Circuit<'k> {
             ];
             registers.iter().for_each(|register| register.set(self.zero(register.bits())));
             self.address.set(cleared.resize(self.address.bits()));
-            self.mirror.set(self.taxel(shape.cols - 1));
+            self.mirror.set(self.taxel(params.cols - 1));
         });
         joins
     }
@@ -283,12 +284,12 @@ impl<'k> Circuit<'k> {
 
     /// The steepest neighbour of a taxel, where the product of its rise is `valid`, and the numbers of the maxima.
     fn climb(&self, valid: Expr<'k>) -> Climbed<'k> {
-        let (k, shape) = (self.k, self.shape);
+        let (k, params) = (self.k, self.params);
         let zero = |bits: usize| self.zero(bits);
         let bits = self.multiplier.product.bits() - 1;
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let (rise, steepest, tall) = (register("rise", bits), register("steepest", DIRECTION), register("tall", 1));
-        let peak = register("peak", shape.smoothed);
+        let peak = register("peak", params.smoothed);
 
         k.comment("The steepest neighbour; maxima");
         let rises =
@@ -306,9 +307,9 @@ impl<'k> Circuit<'k> {
         k.when(self.is(ALONG_COLUMNS) & self.multiplier.smoothed & peak.less(self.multiplier.result), || {
             peak.set(self.multiplier.result)
         });
-        k.when(self.is(ALONG_ROWS), || peak.set(zero(shape.smoothed)));
+        k.when(self.is(ALONG_ROWS), || peak.set(zero(params.smoothed)));
         let floor = peak.shift_right(FLOOR.trailing_zeros() as usize);
-        k.when(self.tick.is(3), || tall.set(floor.less(self.multiplier.operand.low(shape.smoothed))));
+        k.when(self.tick.is(3), || tall.set(floor.less(self.multiplier.operand.low(params.smoothed))));
         let decides = k.wire("decides", self.at(CLIMB, 5) & *self.begun);
         let is_top = k.wire("is_top", !steepest.any());
         let full = self.count.all();
@@ -323,11 +324,11 @@ impl<'k> Circuit<'k> {
 
     /// Writes what is smoothed, the steps, and in the way `back` of a walk the basins.
     fn write(&self, back: Expr<'k>, places: Expr<'k>, of_lane: Expr<'k>, climbed: &Climbed<'k>) {
-        let (k, shape, bits) = (self.k, self.shape, self.target.bits());
+        let (k, params, bits) = (self.k, self.params, self.target.bits());
         let stride = |number: usize| k.constant(bits, number as u64);
         let columns = self.is(ALONG_COLUMNS);
         let stores = k.delay("stores", self.is(UNPACK) & self.picks) & *self.counts;
-        let word = columns.mux(self.multiplier.result, self.word.extend(shape.smoothed));
+        let word = columns.mux(self.multiplier.result, self.word.extend(params.smoothed));
         self.memories.words.write(stores | columns & self.multiplier.smoothed, *self.target, word);
         let entry = self.memories.steps_out.bits();
         let step = self.is(WALK).mux(k.constant(1, 1).concat(*self.own), climbed.step).extend(entry);
@@ -338,8 +339,8 @@ impl<'k> Circuit<'k> {
         // Smoothed words are written transposed, so that both axes are read in the order of the addresses.
         let next_line = k.wire("next_line", self.line.plus(1));
         let along = select(&[
-            (self.is(ALONG_ROWS), stride(shape.rows)),
-            (columns, stride(shape.cols)),
+            (self.is(ALONG_ROWS), stride(params.rows)),
+            (columns, stride(params.cols)),
             (self.is(CLIMB), stride(1)),
         ]);
         let along = (*self.target + along).low(bits);

@@ -95,29 +95,29 @@ impl Array {
     /// What converter `converter` answers in the frame of this number about a channel of a row: tag above result, as it
     /// arrives.
     pub fn answer(&self, row: usize, channel: usize, converter: usize, frame: usize) -> u32 {
-        let own = &self.scan.converter;
+        let adc = &self.scan.converter;
         let row = match self.fault {
             Some(Fault::Row { row }) => row,
             _ => row,
         };
         let channel = match self.fault {
-            Some(Fault::NextChannel { converter: of }) if of == converter => (channel + 1) % own.channels,
+            Some(Fault::NextChannel { converter: of }) if of == converter => (channel + 1) % adc.channels,
             _ => channel,
         };
         let volts = self.volts.get(self.scan_of(frame) % self.volts.len().max(1));
         let at = row * self.scan.cols() + channel * self.scan.converters + converter;
         // Channels that are not used are open.
         let level = volts.filter(|_| channel < self.scan.channels).and_then(|volts| volts.get(at)).map_or(0.0, |v| *v);
-        let steps = (1u64 << own.bits) as f64;
-        let middle = if own.bipolar { steps / 2.0 } else { 0.0 };
-        let lsb = (level * own.full_steps() + middle + self.noise(frame, converter)).floor();
+        let steps = (1u64 << adc.bits) as f64;
+        let middle = if adc.bipolar { steps / 2.0 } else { 0.0 };
+        let lsb = (level * adc.full_steps() + middle + self.noise(frame, converter)).floor();
         let result = lsb.clamp(0.0, steps - 1.0) as u32;
-        let tag = if own.tag_bits > 0 { channel as u32 } else { 0 };
-        let answer = tag << own.bits | result;
+        let tag = if adc.tag_bits > 0 { channel as u32 } else { 0 };
+        let answer = tag << adc.bits | result;
         match self.fault {
             Some(Fault::Stuck { converter: of, level }) if of == converter => {
                 if level {
-                    (1u64 << own.answer_bits()).wrapping_sub(1) as u32
+                    (1u64 << adc.answer_bits()).wrapping_sub(1) as u32
                 } else {
                     0
                 }
@@ -178,8 +178,8 @@ mod tests {
             period_us: 1000.0,
         };
         let array = Array::new(scan, 4, Vec::new(), 0.0, None);
-        let told = |fault: Fault| fault.check(&array, 2).map_err(|error| error.to_string());
-        assert_eq!(told(Fault::Flip { converter: 1, frame: 55, bit: 15 }), Ok(()));
+        let checked = |fault: Fault| fault.check(&array, 2).map_err(|error| error.to_string());
+        assert_eq!(checked(Fault::Flip { converter: 1, frame: 55, bit: 15 }), Ok(()));
         let cases = [
             (Fault::Stuck { converter: 2, level: true }, "--wire: converter 2 is not possible; it must be 0 to 1"),
             (Fault::Row { row: 4 }, "--wire: row 4 is not possible; it must be 0 to 3"),
@@ -193,7 +193,7 @@ mod tests {
             ),
         ];
         for (fault, message) in cases {
-            assert_eq!(told(fault), Err(message.to_owned()));
+            assert_eq!(checked(fault), Err(message.to_owned()));
         }
     }
 }

@@ -167,7 +167,7 @@ fn observe(
         let scan_now = array.scan_of(converters.frames());
         if !outputs.pins.cs_n && begun != Some(scan_now) {
             begun = Some(scan_now);
-            if let Some(place) = expected.iter().position(|own| own.number == scan_now) {
+            if let Some(place) = expected.iter().position(|scan| scan.number == scan_now) {
                 seen.times[place].begins = now;
             }
         }
@@ -175,8 +175,8 @@ fn observe(
             frame.push(beat.data);
             if beat.last && frame.len() == taxels {
                 seen.codes.append(&mut frame);
-                if let Some(own) = seen.times.get_mut(frames) {
-                    own.last_code = now;
+                if let Some(times) = seen.times.get_mut(frames) {
+                    times.last_code = now;
                 }
                 frames += 1;
             } else if beat.last {
@@ -187,8 +187,8 @@ fn observe(
         if outputs.m_valid && m_ready {
             seen.beats.push(outputs.m_data);
             if outputs.m_last {
-                if let Some(own) = seen.times.get_mut(seen.ends.len()) {
-                    own.last_beat = now;
+                if let Some(times) = seen.times.get_mut(seen.ends.len()) {
+                    times.last_beat = now;
                 }
                 seen.ends.push(seen.beats.len());
             }

@@ -58,12 +58,12 @@ impl Definitions {
 
 /// The constants and small tables of a scene, in C.
 pub(super) fn constants(model: &Model, layout: &Layout) -> String {
-    let mut all = Definitions::default();
-    add_input(&mut all, model, layout);
-    add_passes(&mut all, model);
-    add_forces(&mut all, model);
-    add_status(&mut all, model);
-    let mut text = all.0 + "\n" + &quads_table(model.layout()) + &input_tables(model);
+    let mut definitions = Definitions::default();
+    add_input(&mut definitions, model, layout);
+    add_passes(&mut definitions, model);
+    add_forces(&mut definitions, model);
+    add_status(&mut definitions, model);
+    let mut text = definitions.0 + "\n" + &quads_table(model.layout()) + &input_tables(model);
     if model.has_network() {
         text += &table("uint32_t", "OUTPUT_PARITY", &OUTPUTS.map(|(parity, _)| parity));
         text += &table("uint32_t", "OUTPUT_ROW", &OUTPUTS.map(|(_, row)| row));
@@ -77,102 +77,102 @@ pub(super) fn constants(model: &Model, layout: &Layout) -> String {
     text
 }
 
-fn add_input(all: &mut Definitions, model: &Model, layout: &Layout) {
+fn add_input(definitions: &mut Definitions, model: &Model, layout: &Layout) {
     let (formats, scene) = (model.formats(), &model.scene);
-    all.unsigned("TAXELS", scene.sensor.taxels());
-    all.unsigned("COLUMNS", scene.sensor.cols);
-    all.unsigned("QUADS", formats.quads);
-    all.unsigned("QUAD_COLUMNS", model.layout().quad_cols());
-    all.unsigned("CODE_BITS", formats.code_bits);
-    all.option("HAS_ZERO", model.prepare.zero.is_some());
-    all.option("HAS_GAIN", model.prepare.gain.is_some());
-    all.unsigned("GAIN_FRACTION", GAIN_FRACTION);
-    all.option("HAS_FULL_SCALE", scene.input.full_scale_MPa.is_some());
-    all.option("UNIPOLAR", scene.input.unipolar);
-    all.add("DEAD_TAXELS", model.dead.len());
-    all.add("NOISE_FLOOR", model.noise_floor());
-    all.add("CONDITION_BOTH_SIGNS", u8::from(scene.partition.condition == Condition::BothSigns));
-    all.add("INPUT_LOW_BITS", formats.input_low_bits);
-    all.add("LIMB_ALIGN", formats.limb_align);
-    all.unsigned("INPUT_HIGH", layout.input_high);
-    all.unsigned("INPUT_LOW", layout.input_low);
-    all.unsigned("BIAS", layout.bias);
-    all.add("BIAS_WORD", ONE);
-    all.option("HAS_CODE_CHECK", model.prepare.check.is_some());
+    definitions.unsigned("TAXELS", scene.sensor.taxels());
+    definitions.unsigned("COLUMNS", scene.sensor.cols);
+    definitions.unsigned("QUADS", formats.quads);
+    definitions.unsigned("QUAD_COLUMNS", model.layout().quad_cols());
+    definitions.unsigned("CODE_BITS", formats.code_bits);
+    definitions.option("HAS_ZERO", model.prepare.zero.is_some());
+    definitions.option("HAS_GAIN", model.prepare.gain.is_some());
+    definitions.unsigned("GAIN_FRACTION", GAIN_FRACTION);
+    definitions.option("HAS_FULL_SCALE", scene.input.full_scale_MPa.is_some());
+    definitions.option("UNIPOLAR", scene.input.unipolar);
+    definitions.add("DEAD_TAXELS", model.dead.len());
+    definitions.add("NOISE_FLOOR", model.noise_floor());
+    definitions.add("CONDITION_BOTH_SIGNS", u8::from(scene.partition.condition == Condition::BothSigns));
+    definitions.add("INPUT_LOW_BITS", formats.input_low_bits);
+    definitions.add("LIMB_ALIGN", formats.limb_align);
+    definitions.unsigned("INPUT_HIGH", layout.input_high);
+    definitions.unsigned("INPUT_LOW", layout.input_low);
+    definitions.unsigned("BIAS", layout.bias);
+    definitions.add("BIAS_WORD", ONE);
+    definitions.option("HAS_CODE_CHECK", model.prepare.check.is_some());
     if let Some(check) = &model.prepare.check {
-        all.option("CODES_FALL", check.falls);
-        all.unsigned("CHECK_MIRROR", code_check::MIRROR);
-        all.unsigned("CHECK_PLATEAU_CODES", code_check::PLATEAU_CODES);
-        all.unsigned("CHECK_PLATEAU_GAP", code_check::PLATEAU_GAP);
-        all.unsigned("CHECK_FINE", code_check::FINE);
-        all.unsigned("CHECK_LOADED", code_check::LOADED);
+        definitions.option("CODES_FALL", check.falls);
+        definitions.unsigned("CHECK_MIRROR", code_check::MIRROR);
+        definitions.unsigned("CHECK_PLATEAU_CODES", code_check::PLATEAU_CODES);
+        definitions.unsigned("CHECK_PLATEAU_GAP", code_check::PLATEAU_GAP);
+        definitions.unsigned("CHECK_FINE", code_check::FINE);
+        definitions.unsigned("CHECK_LOADED", code_check::LOADED);
     }
 }
 
-fn add_passes(all: &mut Definitions, model: &Model) {
+fn add_passes(definitions: &mut Definitions, model: &Model) {
     let formats = model.formats();
-    all.option("HAS_NETWORK", model.has_network());
-    all.option("HAS_SEARCH", model.searches());
-    all.option("SHARES_A", formats.shared_a);
-    all.unsigned("VECTOR_COUNT", formats.vectors());
-    all.unsigned("VECTOR_BITS", formats.vector_bits);
-    all.unsigned("FULL_LENGTH", formats.full_length());
-    all.unsigned("A_SHIFT", formats.a_shift);
-    all.unsigned("EXTRA_BITS", SEARCH_EXTRA_BITS);
-    all.unsigned("DATA_BITS", formats.data_bits);
+    definitions.option("HAS_NETWORK", model.has_network());
+    definitions.option("HAS_SEARCH", model.searches());
+    definitions.option("SHARES_A", formats.shared_a);
+    definitions.unsigned("VECTOR_COUNT", formats.vectors());
+    definitions.unsigned("VECTOR_BITS", formats.vector_bits);
+    definitions.unsigned("FULL_LENGTH", formats.full_length());
+    definitions.unsigned("A_SHIFT", formats.a_shift);
+    definitions.unsigned("EXTRA_BITS", SEARCH_EXTRA_BITS);
+    definitions.unsigned("DATA_BITS", formats.data_bits);
     if let Some(network) = &model.quantised().network {
         let [least, most] = ln_sigma_range();
-        all.unsigned("LAYER_COUNT", network.layers.len());
-        all.unsigned("LAYER_SHIFT", network.shift);
-        all.unsigned("LAST_SHIFT", LAST_SHIFT);
-        all.add("LARGEST_IMAGE", (1i64 << formats.image_bits()) - 1);
-        all.unsigned("POSITION_BITS", POSITION_BITS);
-        all.unsigned("OUTPUT_BITS", OUTPUT_BITS);
-        all.add("LN_SIGMA_LEAST", format!("({least})"));
-        all.add("LN_SIGMA_MOST", most);
-        all.unsigned("LN_SIGMA_BITS", LN_SIGMA_BITS);
-        all.unsigned("REDUCTIONS", REDUCTIONS);
-        all.unsigned("REDUCTION_SHIFT", REDUCTION_SHIFT);
-        all.add("MU_STEPS", MU_STEPS);
-        all.unsigned("POSITION_SHIFT", POSITION_SHIFT);
+        definitions.unsigned("LAYER_COUNT", network.layers.len());
+        definitions.unsigned("LAYER_SHIFT", network.shift);
+        definitions.unsigned("LAST_SHIFT", LAST_SHIFT);
+        definitions.add("LARGEST_IMAGE", (1i64 << formats.image_bits()) - 1);
+        definitions.unsigned("POSITION_BITS", POSITION_BITS);
+        definitions.unsigned("OUTPUT_BITS", OUTPUT_BITS);
+        definitions.add("LN_SIGMA_LEAST", format!("({least})"));
+        definitions.add("LN_SIGMA_MOST", most);
+        definitions.unsigned("LN_SIGMA_BITS", LN_SIGMA_BITS);
+        definitions.unsigned("REDUCTIONS", REDUCTIONS);
+        definitions.unsigned("REDUCTION_SHIFT", REDUCTION_SHIFT);
+        definitions.add("MU_STEPS", MU_STEPS);
+        definitions.unsigned("POSITION_SHIFT", POSITION_SHIFT);
     }
     if model.searches() {
-        all.unsigned("OPERAND_VECTORS", formats.operand_vectors());
-        all.unsigned("COARSE_CENTRES", COARSE_CENTRES.len());
-        all.unsigned("HALVINGS", HALVINGS);
-        all.unsigned("EPSILON_SHIFT", EPSILON_SHIFT);
-        all.unsigned("LOG_FRACTION", LOG_FRACTION);
-        all.unsigned("LOG_TABLE_BITS", LOG_TABLE_BITS);
+        definitions.unsigned("OPERAND_VECTORS", formats.operand_vectors());
+        definitions.unsigned("COARSE_CENTRES", COARSE_CENTRES.len());
+        definitions.unsigned("HALVINGS", HALVINGS);
+        definitions.unsigned("EPSILON_SHIFT", EPSILON_SHIFT);
+        definitions.unsigned("LOG_FRACTION", LOG_FRACTION);
+        definitions.unsigned("LOG_TABLE_BITS", LOG_TABLE_BITS);
     }
 }
 
-fn add_forces(all: &mut Definitions, model: &Model) {
+fn add_forces(definitions: &mut Definitions, model: &Model) {
     let formats = model.formats();
     let rescale_most = formats.raw_length_max.saturating_sub(formats.full_length());
-    all.long("MU_STEP", formats.mu_step);
-    all.unsigned("MU_ROUND", MU_ROUND);
-    all.unsigned("MU_FRACTION", formats.mu_fraction);
-    all.unsigned("FORCE_SHIFT", formats.mu_fraction + rescale_most);
-    all.unsigned("FORCE_HEADROOM", FORCE_BITS - formats.search_bits[0]);
-    all.unsigned("FORCE_SHIFT_MOST", FORCE_SHIFT_MAX);
-    all.unsigned("FORCE_BITS", FORCE_BITS);
-    all.long("THRESHOLD", model.threshold());
+    definitions.long("MU_STEP", formats.mu_step);
+    definitions.unsigned("MU_ROUND", MU_ROUND);
+    definitions.unsigned("MU_FRACTION", formats.mu_fraction);
+    definitions.unsigned("FORCE_SHIFT", formats.mu_fraction + rescale_most);
+    definitions.unsigned("FORCE_HEADROOM", FORCE_BITS - formats.search_bits[0]);
+    definitions.unsigned("FORCE_SHIFT_MOST", FORCE_SHIFT_MAX);
+    definitions.unsigned("FORCE_BITS", FORCE_BITS);
+    definitions.long("THRESHOLD", model.threshold());
 }
 
 /// Word and lowest bit of each field of the status, and the words that are constant.
-fn add_status(all: &mut Definitions, model: &Model) {
-    all.unsigned("STATUS_WORDS", STATUS_WORDS);
+fn add_status(definitions: &mut Definitions, model: &Model) {
+    definitions.unsigned("STATUS_WORDS", STATUS_WORDS);
     for field in status_fields().into_iter().filter(|field| field.feature.is_in(&model.scene)) {
         let name = format!("STATUS_{}", field.name.to_uppercase());
-        all.add(&name, format!("{}U, {}U", status_word(&field), field.low));
+        definitions.add(&name, format!("{}U, {}U", status_word(&field), field.low));
     }
-    all.option("HAS_SCORE_LIMIT", model.score_limit.is_some());
-    all.add("SCORE_LIMIT", format!("({})", model.score_limit.unwrap_or_default()));
-    all.option("HAS_PUSH_LIMIT", model.push_limit.is_some());
-    all.long("PUSH_LIMIT", i64::from(model.push_limit.unwrap_or_default()));
+    definitions.option("HAS_SCORE_LIMIT", model.score_limit.is_some());
+    definitions.add("SCORE_LIMIT", format!("({})", model.score_limit.unwrap_or_default()));
+    definitions.option("HAS_PUSH_LIMIT", model.push_limit.is_some());
+    definitions.long("PUSH_LIMIT", i64::from(model.push_limit.unwrap_or_default()));
     let cycles = |words: Vec<i32>| CYCLES.get(&model.run_prepared(&Prepared { words, ..model.prepare.empty() }).status);
-    all.unsigned("CYCLES_SEARCHED", cycles(loaded(model)));
-    all.unsigned("CYCLES_NOT_SEARCHED", cycles(vec![0; model.scene.sensor.taxels()]));
+    definitions.unsigned("CYCLES_SEARCHED", cycles(loaded(model)));
+    definitions.unsigned("CYCLES_NOT_SEARCHED", cycles(vec![0; model.scene.sensor.taxels()]));
 }
 
 /// Words of the frame buffer that meet any condition.

@@ -18,7 +18,7 @@ use super::core_clock::Acquired;
 
 /// A board's answer to a frame, in LSBs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct BoardAnswer {
     /// Sums over all taxels; of a board that sends records none.
     pub sums: Option<Sums>,
     /// Forces `[fx, fy, fz]` of all taxels, row-major, if requested; or the beats of the records.
@@ -39,9 +39,9 @@ pub struct Answer {
     pub short_forces: Option<usize>,
 }
 
-impl Answer {
+impl BoardAnswer {
     /// Parses the payload of a forces or resultants packet; `None` if its length is wrong.
-    pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
+    pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<BoardAnswer> {
         let others = (model.status_triples() + model.code_beats()) * BEAT_BYTES;
         let (front, others) = bytes.split_at_checked(bytes.len().checked_sub(others)?)?;
         let mut labels = beats_of_bytes(others)?;
@@ -59,7 +59,7 @@ impl Answer {
         };
         let (difference, received_at) = (None, SystemTime::now());
         let (acquired, short_forces) = (None, None);
-        Some(Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces })
+        Some(BoardAnswer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces })
     }
 
     /// The first difference from the bit-true model's result for `codes`, `None` if equal. What the model does not see is
@@ -202,7 +202,7 @@ impl PhysicalAnswer {
     ///
     /// # Errors
     /// A frame of another sensor; an answer that the model cannot decode.
-    pub fn new(model: &Model, readings: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
+    pub fn new(model: &Model, readings: &Frame, answer: &BoardAnswer) -> Result<PhysicalAnswer> {
         let frame = &model.stress(std::slice::from_ref(readings))?;
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
         let sensor = &model.scene.sensor;
@@ -261,8 +261,9 @@ mod tests {
         let status = Status::all(&trace.status).flat_map(changed).collect();
         let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
         let (forces, difference, acquired, short_forces) = (None, None, None, None);
-        let answer = Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces };
-        let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
+        let answer =
+            BoardAnswer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces };
+        let whole = BoardAnswer { forces: Some(trace.beats), ..answer.clone() };
         [answer, whole].map(|answer| PhysicalAnswer::new(model, frame, &answer).unwrap())
     }
 
@@ -304,7 +305,7 @@ mod tests {
         let model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
         let codes = model.readings(&Frame::shipped(&model.scene)[1..2]).unwrap();
         let trace = model.run(&codes);
-        let answer = |status| Answer {
+        let answer = |status| BoardAnswer {
             sums: None,
             forces: None,
             labels: Vec::new(),

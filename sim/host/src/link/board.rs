@@ -3,7 +3,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::Identity;
 
-use super::answer::Answer;
+use super::answer::BoardAnswer;
 use super::error::HostError;
 
 /// Transmission errors that were corrected by repetition.
@@ -63,7 +63,7 @@ pub trait Board {
     ///
     /// # Errors
     /// No answer.
-    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError>;
+    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<BoardAnswer, HostError>;
 
     /// Writes an image of tables.
     ///

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, scene_hash, Counters, Decoder, Identity, Kind, Packet, VERSION};
 
-use super::answer::Answer;
+use super::answer::BoardAnswer;
 use super::board::{Board, LinkErrors, PacketCounters};
 use super::error::{HostError, IdentityError};
 
@@ -134,11 +134,11 @@ impl<P: Read + Write> Board for Client<P> {
         Ok(PacketCounters { taken: taken.into(), dropped, bits: u16::BITS })
     }
 
-    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
+    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<BoardAnswer, HostError> {
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
         let bytes = self.request(kind, codes_to_bytes(codes, model.formats().code_bits))?;
         let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
-        Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
+        BoardAnswer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {

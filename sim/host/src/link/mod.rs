@@ -26,7 +26,7 @@ mod session;
 pub mod stream;
 mod terminal;
 
-pub use answer::{Answer, PhysicalAnswer};
+pub use answer::{BoardAnswer, PhysicalAnswer};
 pub use board::{Board, LinkErrors, PacketCounters};
 pub use client::{check_identity, Client};
 pub use controller::SpiController;

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant, SystemTime};
 
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{require_one_answer, Identity, Kind};
-use dermis_golden::wire::udp::{Answer as Whole, Answers, CoreIdentity, Packet, TooLong, LAYOUT, MOST_ARRAYS};
+use dermis_golden::wire::udp::{Answers, CoreAnswer, CoreIdentity, Packet, TooLong, LAYOUT, MOST_ARRAYS};
 
-use super::answer::Answer;
+use super::answer::BoardAnswer;
 use super::board::{Board, LinkErrors, PacketCounters};
 use super::client::{check_scene, waits, ATTEMPTS};
 use super::core_clock::{CoreClock, Drift, HostClock};
@@ -102,7 +102,7 @@ impl NetworkClient {
         what: &'static str,
         renews: bool,
         packets: &dyn Fn(u32) -> Result<Vec<Packet>, TooLong>,
-        wanted: &dyn Fn(Whole, u32) -> Option<T>,
+        wanted: &dyn Fn(CoreAnswer, u32) -> Option<T>,
     ) -> Result<(T, [i64; 2]), HostError> {
         for attempt in 0..ATTEMPTS {
             self.repeated += u64::from(attempt > 0);
@@ -122,7 +122,7 @@ impl NetworkClient {
     }
 
     /// The answer that is wanted; `None` after the timeout.
-    fn wait<T>(&mut self, wanted: &dyn Fn(Whole, u32) -> Option<T>) -> Result<Option<T>, HostError> {
+    fn wait<T>(&mut self, wanted: &dyn Fn(CoreAnswer, u32) -> Option<T>) -> Result<Option<T>, HostError> {
         let begun = Instant::now();
         let mut bytes = vec![0; DATAGRAM];
         while begun.elapsed() < self.timeout {
@@ -145,9 +145,9 @@ impl NetworkClient {
     }
 
     /// Asks what the core is, and for the counters of its array.
-    fn ask(&mut self) -> Result<(CoreIdentity, [i64; 2]), HostError> {
+    fn request_identity(&mut self) -> Result<(CoreIdentity, [i64; 2]), HostError> {
         let own = |answer, wanted| match answer {
-            Whole::Identity { sequence, identity } if sequence == wanted => Some(identity),
+            CoreAnswer::Identity { sequence, identity } if sequence == wanted => Some(identity),
             _ => None,
         };
         let array = self.number();
@@ -186,7 +186,7 @@ impl Board for NetworkClient {
                 self.failed(&"hardware.source = adc-scan: a core behind Ethernet takes frames and scans no array")
             );
         }
-        let (core, _) = self.ask()?;
+        let (core, _) = self.request_identity()?;
         check(model, &core).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })?;
         match (core.word("arrays") as usize, self.array) {
             (arrays, None) if arrays > 1 => {
@@ -204,7 +204,7 @@ impl Board for NetworkClient {
         self.fragment_words = (core.word("fragment_words") as usize).clamp(1, LAYOUT.fragment_words);
         self.short_forces = core.word("force_bits") == SHORT_BITS;
         for _ in 0..QUESTIONS {
-            let (core, [sent_ns, answered_ns]) = self.ask()?;
+            let (core, [sent_ns, answered_ns]) = self.request_identity()?;
             self.clock.add(sent_ns, core.cycles(), answered_ns);
         }
         let sensor = &model.scene.sensor;
@@ -228,32 +228,32 @@ impl Board for NetworkClient {
     }
 
     fn counters(&mut self) -> Result<PacketCounters, HostError> {
-        let (core, [sent_ns, answered_ns]) = self.ask()?;
+        let (core, [sent_ns, answered_ns]) = self.request_identity()?;
         self.clock.add(sent_ns, core.cycles(), answered_ns);
         let dropped = ["ignored", "refused", "damaged", "overrun", "cut"].map(|name| (name, core.word(name))).to_vec();
         Ok(PacketCounters { taken: core.word("taken"), dropped, bits: u32::BITS })
     }
 
-    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
+    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<BoardAnswer, HostError> {
         let (form, fragment_words) = ((self.code_bytes, self.bits_left_out), self.fragment_words);
         let array = self.number();
         let packets = |sequence| Packet::frame(sequence, array, codes, form, fragment_words);
         let result = |answer, wanted| match answer {
-            Whole::Result { sequence, cycles, words, .. } if sequence == wanted => Some((cycles, words)),
+            CoreAnswer::Result { sequence, cycles, words, .. } if sequence == wanted => Some((cycles, words)),
             _ => None,
         };
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
         let ((cycles, words), [sent_ns, answered_ns]) = self.request(kind.name(), true, &packets, &result)?;
         self.clock.add(sent_ns, cycles, answered_ns);
         let bytes: Vec<u8> = words.into_iter().flat_map(u32::to_le_bytes).collect();
-        let answer = Answer::of_bytes(model, &bytes, true);
+        let answer = BoardAnswer::of_bytes(model, &bytes, true);
         let answer = answer.ok_or(HostError::Answer {
             port: self.name.clone(),
             what: kind.answer().name(),
             bytes: bytes.len(),
         })?;
         let short_forces = self.short_forces.then_some(fragment_words);
-        Ok(Answer { short_forces, acquired: self.clock.at(cycles), ..answer })
+        Ok(BoardAnswer { short_forces, acquired: self.clock.at(cycles), ..answer })
     }
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
@@ -263,7 +263,9 @@ impl Board for NetworkClient {
         for packet in all {
             // The same number again: the core has taken a fragment whose answer was lost.
             let taken = |answer, wanted| match answer {
-                Whole::TablesTaken { sequence, index } => (sequence == wanted && index == packet.index).then_some(()),
+                CoreAnswer::TablesTaken { sequence, index } => {
+                    (sequence == wanted && index == packet.index).then_some(())
+                }
                 _ => None,
             };
             self.request("tables", false, &|_| Ok(vec![packet.clone()]), &taken)?;

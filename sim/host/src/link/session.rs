@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use super::answer::Answer;
+use super::answer::BoardAnswer;
 use super::board::{load, Board};
 use super::client::Client;
 use super::error::HostError;
@@ -71,13 +71,13 @@ impl Session {
     ///
     /// # Errors
     /// A frame of another sensor, a board that scans its array, no answer.
-    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, BoardAnswer)> {
         if self.identity.scans() {
             bail!("hardware.source = adc-scan: the board scans its array and takes no frames");
         }
         let frame = self.subtract_tare(frame);
         let codes = self.sent_codes(self.model.readings(std::slice::from_ref(&frame))?);
-        let answer = self.ask(&codes)?;
+        let answer = self.exchange(&codes)?;
         let answer = self.checked(answer, &codes);
         Ok((frame, answer))
     }
@@ -87,11 +87,11 @@ impl Session {
     ///
     /// # Errors
     /// A board that does not scan, no answer.
-    pub fn scan(&mut self, id: &str) -> Result<(Frame, Answer)> {
+    pub fn scan(&mut self, id: &str) -> Result<(Frame, BoardAnswer)> {
         if !self.identity.scans() {
             bail!("hardware.source = stream: the board takes frames and scans no array");
         }
-        let answer = self.ask(&[])?;
+        let answer = self.exchange(&[])?;
         let readings = self.model.readings_of(id, &answer.codes);
         let readings = readings.ok_or_else(|| anyhow!("the answer has {} codes", answer.codes.len()))?;
         let codes = answer.codes.clone();
@@ -99,9 +99,9 @@ impl Session {
         Ok((readings, answer))
     }
 
-    /// Whether all forces are asked for: a board that cannot sum them sends them all, and the host sums them. One that sends
+    /// Whether all forces are requested: a board that cannot sum them sends them all, and the host sums them. One that sends
     /// records has no forces.
-    fn asks_forces(&self) -> bool {
+    fn requests_forces(&self) -> bool {
         match self.forces {
             true => self.identity.supports(Kind::FrameForForces),
             false => !self.identity.supports(Kind::FrameForResultants),
@@ -114,17 +114,17 @@ impl Session {
         codes.into_iter().map(|code| code >> left_out << left_out).collect()
     }
 
-    fn ask(&mut self, codes: &[i32]) -> Result<Answer, HostError> {
-        let forces = self.asks_forces();
+    fn exchange(&mut self, codes: &[i32]) -> Result<BoardAnswer, HostError> {
+        let forces = self.requests_forces();
         self.board.frame(&self.model, codes, forces)
     }
 
     /// The answer compared with the model if requested, with the forces that the user wants.
-    fn checked(&self, mut answer: Answer, codes: &[i32]) -> Answer {
+    fn checked(&self, mut answer: BoardAnswer, codes: &[i32]) -> BoardAnswer {
         if self.check {
             answer.difference = Some(answer.compare_with_model(&self.model, codes));
         }
-        answer.forces = answer.forces.filter(|_| self.forces || !self.asks_forces());
+        answer.forces = answer.forces.filter(|_| self.forces || !self.requests_forces());
         answer
     }
 }

@@ -12,7 +12,7 @@ use dermis_golden::fixed::Model;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::answer::{Answer, PhysicalAnswer};
+use super::answer::{BoardAnswer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
 use crate::stream::acquisition::Acquisition;
@@ -25,7 +25,7 @@ use dermis_flow::output::write;
 struct Reply {
     id: Value,
     /// Nanoseconds since 1970 when the frame was acquired: as its line states, else when it entered the core, of one that says it,
-    /// else when it was sent or asked for.
+    /// else when it was sent or requested.
     time_ns: i64,
     /// By how many ns the time at which it entered the core may differ from the true one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,14 +41,14 @@ struct Reply {
 }
 
 impl Reply {
-    /// The line for an answer to `readings`, which were acquired at `time_ns` and asked for at `sent`, with `checks`.
+    /// The line for an answer to `readings`, which were acquired at `time_ns` and requested at `sent`, with `checks`.
     fn new(
         model: &Model,
         checks: &mut StreamChecks,
         id: Value,
         (stated_ns, sent): (Option<i64>, SystemTime),
         readings: &Frame,
-        answer: &Answer,
+        answer: &BoardAnswer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
         checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.diagnostics());
@@ -177,9 +177,9 @@ pub fn run_scans(
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     let mut checks = StreamChecks::new(&session.model, CheckPace::Beside);
     for id in scans {
-        let asked = SystemTime::now();
+        let requested_at = SystemTime::now();
         let (readings, answer) = session.scan(&id)?;
-        let reply = Reply::new(&session.model, &mut checks, id.into(), (None, asked), &readings, &answer)?;
+        let reply = Reply::new(&session.model, &mut checks, id.into(), (None, requested_at), &readings, &answer)?;
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;

@@ -20,25 +20,25 @@ pub enum Pace {
 }
 
 /// Most bytes of the lines of a file that is repeated, which are kept so that it is read and put into words once.
-const KEPT_BYTES: usize = 4 << 20;
+const REPEATED_BYTES: usize = 4 << 20;
 
 /// When a frame was acquired, and its line.
 type TimedLine = (u64, Arc<[u8]>);
 
 /// The lines of a file that begins again.
 #[derive(Default)]
-struct Kept {
+struct RepeatedLines {
     lines: Vec<TimedLine>,
     bytes: usize,
     /// Number of the next line, once all are there.
     next: Option<usize>,
 }
 
-impl Kept {
+impl RepeatedLines {
     /// Keeps a line; whether there was room.
     fn add(&mut self, time_ns: u64, line: &Arc<[u8]>) -> bool {
         self.bytes += line.len();
-        let fits = self.bytes <= KEPT_BYTES;
+        let fits = self.bytes <= REPEATED_BYTES;
         if fits {
             self.lines.push((time_ns, Arc::clone(line)));
         }
@@ -54,7 +54,7 @@ pub struct Lines {
     /// Begin again at the end.
     repeat: bool,
     /// The lines so far of a file that begins again and is not too long.
-    kept: Option<Kept>,
+    repeated: Option<RepeatedLines>,
     /// Take a file that is cut like one that ends.
     partial: bool,
     frames: Frames,
@@ -81,8 +81,8 @@ impl Lines {
     ) -> Result<Lines, RecordingError> {
         let frames = Frames::open(&path, options.clone())?;
         let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Cursor::default());
-        let kept = repeat.then(Kept::default);
-        Ok(Lines { path, options, pace, repeat, kept, partial, frames, begun: None, count: 0, due, gap, line })
+        let repeated = repeat.then(RepeatedLines::default);
+        Ok(Lines { path, options, pace, repeat, repeated, partial, frames, begun: None, count: 0, due, gap, line })
     }
 
     /// How the file ends, once there is no further line.
@@ -100,13 +100,14 @@ impl Lines {
         // NaN, a missing reading, is written as null.
         let line = format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa}));
         let line: Arc<[u8]> = line.into_bytes().into();
-        self.kept = self.kept.take().and_then(|mut kept| kept.add(frame.time_ns, &line).then_some(kept));
+        self.repeated =
+            self.repeated.take().and_then(|mut repeated| repeated.add(frame.time_ns, &line).then_some(repeated));
         Ok(Some((frame.time_ns, line)))
     }
 
     /// The same of the lines that are kept, once all are: they begin again.
     fn next_kept(&mut self) -> Option<TimedLine> {
-        let Kept { lines, next, .. } = self.kept.as_mut()?;
+        let RepeatedLines { lines, next, .. } = self.repeated.as_mut()?;
         let number = next.as_mut()?;
         let line = lines.get(*number).cloned();
         *number += 1;
@@ -115,13 +116,13 @@ impl Lines {
 
     /// Takes the next line, once it is due; returns whether there is one.
     fn advance(&mut self) -> Result<bool, RecordingError> {
-        let all_kept = self.kept.as_ref().is_some_and(|kept| kept.next.is_some());
+        let all_kept = self.repeated.as_ref().is_some_and(|repeated| repeated.next.is_some());
         let mut next = if all_kept { self.next_kept() } else { self.read_next()? };
         if next.is_none() && self.repeat {
             (self.begun, self.count, self.due) = (None, 0, Duration::ZERO);
-            next = match self.kept.as_mut().filter(|kept| !kept.lines.is_empty()) {
-                Some(kept) => {
-                    kept.next = Some(0);
+            next = match self.repeated.as_mut().filter(|repeated| !repeated.lines.is_empty()) {
+                Some(repeated) => {
+                    repeated.next = Some(0);
                     self.next_kept()
                 }
                 None => {
@@ -163,7 +164,7 @@ impl Read for Lines {
 mod tests {
     use super::*;
     use crate::recording::Recorder;
-    use crate::stream::{Answer, Outcome};
+    use crate::stream::{Outcome, StreamAnswer};
     use dermis_golden::data::frame::Frame;
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::Scene;
@@ -179,7 +180,7 @@ mod tests {
         for (sequence, received_s) in (0..).zip(seconds) {
             let (received_s, frames) = (*received_s, &frames[..]);
             let time_ns = (received_s * 1e9).round() as i64;
-            let answer = Answer {
+            let answer = StreamAnswer {
                 sequence,
                 line: sequence + 1,
                 received_s,
@@ -199,8 +200,8 @@ mod tests {
 
     #[test]
     fn lines_are_kept_while_there_is_room() {
-        let (mut kept, line) = (Kept::default(), Arc::from(vec![b'1'; KEPT_BYTES / 2]));
-        assert!(kept.add(1, &line) && kept.add(2, &line) && !kept.add(3, &Arc::from(*b"1")));
+        let (mut repeated, line) = (RepeatedLines::default(), Arc::from(vec![b'1'; REPEATED_BYTES / 2]));
+        assert!(repeated.add(1, &line) && repeated.add(2, &line) && !repeated.add(3, &Arc::from(*b"1")));
     }
 
     #[test]

@@ -77,13 +77,13 @@ fn ratios(sensor: &Sensor, result: &Reconstruction) -> Vec<(&'static str, Vec<f6
         return Vec::new();
     }
     let parts: Vec<Part> = match &result.extra.regions {
-        Some(regions) => regions.iter().map(|own| (own.taxels.clone(), own.mu, own.mu_sigma)).collect(),
+        Some(regions) => regions.iter().map(|region| (region.taxels.clone(), region.mu, region.mu_sigma)).collect(),
         None => {
             let taxels = |row0: usize, col0: usize, rows: usize, cols: usize| {
                 (0..rows * cols).map(|k| (row0 + k / cols) * sensor.cols + col0 + k % cols).collect()
             };
-            let own = result.subarrays.iter();
-            own.map(|own| (taxels(own.row0, own.col0, own.rows, own.cols), own.mu, own.mu_sigma)).collect()
+            let subarrays = result.subarrays.iter();
+            subarrays.map(|part| (taxels(part.row0, part.col0, part.rows, part.cols), part.mu, part.mu_sigma)).collect()
         }
     };
     let mut columns: Vec<(&str, Vec<f64>)> = Vec::new();
@@ -93,8 +93,8 @@ fn ratios(sensor: &Sensor, result: &Reconstruction) -> Vec<(&'static str, Vec<f6
         }
         let mut values = vec![f64::NAN; sensor.taxels()];
         for (taxels, mu, sigma) in &parts {
-            let Some(own) = of(*mu, *sigma) else { continue };
-            taxels.iter().for_each(|taxel| values[*taxel] = own[axis]);
+            let Some(ratio) = of(*mu, *sigma) else { continue };
+            taxels.iter().for_each(|taxel| values[*taxel] = ratio[axis]);
         }
         columns.push((name, values));
     };

@@ -15,7 +15,7 @@ use dermis_golden::spec::sensor::Sensor;
 use super::arrows::Arrows;
 use super::points::Points;
 use super::{contact_channel, header, torque, ARROWS, FORCES, FRAME_ID, RESULT};
-use crate::stream::{seconds, Answer, Outcome};
+use crate::stream::{seconds, Outcome, StreamAnswer};
 
 /// After this time what was recorded is in the file: a chunk is at most half a second, the rest is for the disk.
 const CHUNK: Duration = Duration::from_millis(400);
@@ -117,7 +117,7 @@ impl Recorder {
         }
     }
 
-    fn answer(&self, answer: &Answer, entry: &mut Entry) -> Result<()> {
+    fn answer(&self, answer: &StreamAnswer, entry: &mut Entry) -> Result<()> {
         for (frame, time_ns) in answer.frames.iter().zip(answer.times_ns) {
             let shape = [self.sensor.rows, self.sensor.cols];
             for (topic, cdr) in frame_messages(shape, &header(FRAME_ID, *time_ns), &frame.readings())? {

@@ -15,7 +15,7 @@ use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
 use super::line::{self, Brought, LineFrame};
 use super::queue::Policy;
-use super::reader::Received;
+use super::reader::ReceivedLine;
 use super::zero::{ZeroRequest, Zeros, ZERO_FRAMES};
 use crate::engine::typed;
 
@@ -81,7 +81,7 @@ impl fmt::Display for Counts {
 #[serde(untagged)]
 pub enum Outcome<'a> {
     /// Of the last line of a block.
-    Answer(Answer<'a>),
+    Answer(StreamAnswer<'a>),
     /// Of a line without a result.
     Refusal(Refusal<'a>),
     /// What is to be said of the stream; no output line.
@@ -90,7 +90,7 @@ pub enum Outcome<'a> {
 
 /// A result.
 #[derive(Clone, Copy, Serialize)]
-pub struct Answer<'a> {
+pub struct StreamAnswer<'a> {
     /// Number of the result, from 0.
     pub sequence: u64,
     /// Number of its last line, from 1.
@@ -118,7 +118,7 @@ pub struct Answer<'a> {
     pub result: &'a Reconstruction,
 }
 
-impl Answer<'_> {
+impl StreamAnswer<'_> {
     /// Nanoseconds since 1970 when its last frame was acquired.
     pub fn time_ns(&self) -> i64 {
         // A frame of its own completes every block.
@@ -149,7 +149,7 @@ pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> 
             Outcome::Note(_) => return Ok(()),
             Outcome::Answer(answer) if brief => {
                 let result = &Reconstruction { forces_N: Forces::default(), ..answer.result.clone() };
-                serde_json::to_string(&Answer { result, ..*answer })?
+                serde_json::to_string(&StreamAnswer { result, ..*answer })?
             }
             outcome => serde_json::to_string(outcome)?,
         } + "\n";
@@ -217,8 +217,8 @@ impl<'a> Stream<'a> {
 
     /// Hands on what a line gave, it or lines before that waited; nothing for a frame that does not complete its block. `full` lines so
     /// far found the queue full.
-    pub(super) fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
-        let Received { number: line, time, at, .. } = *received;
+    pub(super) fn answer(&mut self, received: &ReceivedLine, full: u64, output: &mut Output) -> std::io::Result<()> {
+        let ReceivedLine { number: line, time, at, .. } = *received;
         self.read.push_back(Stamp { line, time, at });
         let brought = match &received.bytes {
             Ok(bytes) if self.read.len() <= MOST_WAITING => self.frames.push(bytes, line),
@@ -299,7 +299,7 @@ impl<'a> Stream<'a> {
         let estimator = self.estimators.name();
         self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(at));
         let [received_s, answered_s] = [time, SystemTime::now()].map(seconds);
-        output(&Outcome::Answer(Answer {
+        output(&Outcome::Answer(StreamAnswer {
             sequence,
             line,
             received_s,

@@ -43,7 +43,7 @@ pub mod together;
 pub mod zero;
 
 pub use answers::nanoseconds;
-pub use answers::{as_lines, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions};
+pub use answers::{as_lines, seconds, Counts, Outcome, Output, Refusal, StreamAnswer, StreamOptions};
 pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;

@@ -14,7 +14,7 @@ use super::rate::Clock;
 use super::stop::Stop;
 
 /// A line as it was received.
-pub(super) struct Received {
+pub(super) struct ReceivedLine {
     /// Its number, from 1.
     pub(super) number: u64,
     /// When it was read.
@@ -28,7 +28,7 @@ pub(super) struct Received {
 /// The lines of an input, read by a thread of their own.
 pub(super) struct Lines {
     name: String,
-    queue: Arc<Queue<Received>>,
+    queue: Arc<Queue<ReceivedLine>>,
     /// Not joined where the output is closed first: the read may never return.
     thread: JoinHandle<std::io::Result<()>>,
 }
@@ -54,7 +54,7 @@ impl Lines {
     }
 
     /// The oldest line that waits.
-    pub(super) fn take(&self) -> Taken<Received> {
+    pub(super) fn take(&self) -> Taken<ReceivedLine> {
         self.queue.take()
     }
 
@@ -77,7 +77,7 @@ impl Lines {
 }
 
 /// Reads all lines into the queue; blank ones only count.
-fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>) -> std::io::Result<()> {
+fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<ReceivedLine>) -> std::io::Result<()> {
     let (mut input, mut line) = (BufReader::new(Decoded::new(input)), Vec::new());
     for number in 1.. {
         let Some(piece) = line::read(&mut input, &mut line)? else { break };
@@ -85,7 +85,7 @@ fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>)
             continue;
         }
         let bytes = piece.refusal().map_or_else(|| Ok(std::mem::take(&mut line)), Err);
-        if !queue.push(Received { number, time: SystemTime::now(), at: clock.now(), bytes }) {
+        if !queue.push(ReceivedLine { number, time: SystemTime::now(), at: clock.now(), bytes }) {
             break;
         }
     }

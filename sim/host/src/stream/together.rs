@@ -137,12 +137,12 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
         running.push(Some(Running { stream, lines, options }));
     }
     while done.iter().any(Option::is_none) && !stop.stopped() {
-        let waits = running.iter().flatten().any(|own| own.stream.waiting().is_some());
+        let waits = running.iter().flatten().any(|member| member.stream.waiting().is_some());
         let heard = if waits { rung.recv_timeout(QUIET) } else { rung.recv().map_err(RecvTimeoutError::from) };
-        for (index, own) in running.iter_mut().enumerate().filter(|_| waits) {
-            match own.as_mut().map_or(Next::More, |own| own.settle(&mut |outcome| output(index, outcome))) {
+        for (index, member) in running.iter_mut().enumerate().filter(|_| waits) {
+            match member.as_mut().map_or(Next::More, |member| member.settle(&mut |outcome| output(index, outcome))) {
                 Next::More => (),
-                how => done[index] = own.take().map(|own| own.end(how)),
+                how => done[index] = member.take().map(|member| member.end(how)),
             }
         }
         let index = match heard {
@@ -150,15 +150,18 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => break,
         };
-        let Some(own) = running[index].as_mut().filter(|_| done[index].is_none() && !stop.stopped()) else { continue };
-        match own.next(&mut |outcome| output(index, outcome)) {
+        let Some(member) = running[index].as_mut().filter(|_| done[index].is_none() && !stop.stopped()) else {
+            continue;
+        };
+        match member.next(&mut |outcome| output(index, outcome)) {
             Next::More => (),
-            how => done[index] = running[index].take().map(|own| own.end(how)),
+            how => done[index] = running[index].take().map(|member| member.end(how)),
         }
     }
     let all = std::iter::zip(running, done);
-    let stopped = |own: Option<Running>| own.map_or_else(|| Ok(Counts::default()), |own| own.end(Next::More));
-    all.map(|(own, done)| done.unwrap_or_else(|| stopped(own))).collect()
+    let stopped =
+        |member: Option<Running>| member.map_or_else(|| Ok(Counts::default()), |member| member.end(Next::More));
+    all.map(|(member, done)| done.unwrap_or_else(|| stopped(member))).collect()
 }
 
 /// What comes of a line.

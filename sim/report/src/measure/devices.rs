@@ -119,19 +119,19 @@ pub struct Devices {
 pub fn devices(scenes: &[Scene], options: &DeviceOptions) -> Result<Devices> {
     let mut all = Devices::default();
     for scene in scenes {
-        let mut own = Devices::default();
+        let mut of_scene = Devices::default();
         let model = Model::new(scene)?;
         let frames = unrelated(scene)?;
-        on_cpu(&model, &frames, options, &mut own)?;
+        on_cpu(&model, &frames, options, &mut of_scene)?;
         let base =
-            own.rows.iter().find(|row| row.device == FLOAT && row.estimator == scene.hardware_estimator().name());
+            of_scene.rows.iter().find(|row| row.device == FLOAT && row.estimator == scene.hardware_estimator().name());
         if let Some(base) = base.map(|row| row.median_s) {
-            own.rows.iter_mut().for_each(|row| row.ratio = Some(row.median_s / base));
+            of_scene.rows.iter_mut().for_each(|row| row.ratio = Some(row.median_s / base));
         }
-        on_microcontrollers(&model, &frames[..COUNTED], &mut own)?;
-        on_fpga(&model, &frames[..COUNTED], options, &mut own)?;
-        all.rows.extend(own.rows);
-        all.notes.extend(own.notes);
+        on_microcontrollers(&model, &frames[..COUNTED], &mut of_scene)?;
+        on_fpga(&model, &frames[..COUNTED], options, &mut of_scene)?;
+        all.rows.extend(of_scene.rows);
+        all.notes.extend(of_scene.notes);
     }
     Ok(all)
 }
@@ -305,7 +305,8 @@ fn with_scipy(
     let _progress = Progress::start(&format!("{}: NumPy and SciPy", scene.name));
     let n = matrices.cz.nrows();
     let columns = [&matrices.cx, &matrices.cy, &matrices.cz];
-    let row = |i: usize| columns.iter().flat_map(move |own| (0..n).map(move |j| own[(i, j)])).collect::<Vec<f64>>();
+    let row =
+        |i: usize| columns.iter().flat_map(move |column| (0..n).map(move |j| column[(i, j)])).collect::<Vec<f64>>();
     let stress: Vec<&Vec<f64>> = frames.iter().map(|frame| &frame.stress_MPa).collect();
     let input = serde_json::json!({ "C": (0..n).map(row).collect::<Vec<_>>(), "frames": stress }).to_string();
     let solve = || {
@@ -330,16 +331,16 @@ fn with_scipy(
     let idle = solve()?;
     let mut apart = Vec::with_capacity(frames.len());
     for (frame, solved) in frames.iter().zip(&idle) {
-        let (own, theirs) = (literal.run(frame)?.resultant(), solved.resultant_N);
+        let (ours, theirs) = (literal.run(frame)?.resultant(), solved.resultant_N);
         let length = |of: [f64; 3]| of.iter().map(|f| f * f).sum::<f64>().sqrt();
-        apart.push(length(std::array::from_fn(|k| own[k] - theirs[k])) / length(own));
+        apart.push(length(std::array::from_fn(|k| ours[k] - theirs[k])) / length(ours));
     }
     let apart = median(apart).unwrap_or_default();
     ensure!(apart <= SAME, "{}: the forces of SciPy are {apart:.3} of their size off those of Eq. 1", python.display());
     let load = Load::start();
     let loaded = solve();
     drop(load);
-    let times = |solved: Vec<Solved>| solved.into_iter().map(|own| own.seconds).collect::<Vec<f64>>();
+    let times = |solved: Vec<Solved>| solved.into_iter().map(|solved| solved.seconds).collect::<Vec<f64>>();
     let median_s = median(times(idle)).unwrap_or(f64::NAN);
     let estimator = "Eq. 1, NumPy and SciPy".to_owned();
     Ok(on_this_cpu(scene, estimator, FLOAT, frames.len(), median_s, quantile(times(loaded?), MOST)))

@@ -12,7 +12,7 @@ use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
 use dermis_study::baseline::Baseline;
 
-use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
+use super::measured::{BitTrue, ContactCount, Implementation, Measured, Options};
 use super::timing::Timing;
 use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
@@ -98,7 +98,7 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
 
 /// `evidence` on every frame, or why not.
 fn evidence_of(scene: &Scene, frames: &[Frame], options: &Options) -> Result<(Golden, Vec<Reconstruction>), String> {
-    if !Engine::Evidence.is_of(scene.partition.case) {
+    if !Implementation::Evidence.is_of(scene.partition.case) {
         return Err("as in case 0".to_owned());
     }
     if options.quick && scene.sensor.taxels() > QUICK_LITERAL {
@@ -146,21 +146,21 @@ fn is_simulated(scene: &Scene, options: &Options) -> bool {
 }
 
 /// Measures every CPU engine that supports the case.
-fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
+fn time(measured: &Measured) -> Result<BTreeMap<Implementation, Timing>> {
     let frames = &measured.frames;
     type Run<'m> = Box<dyn Fn(&Frame) -> Result<()> + 'm>;
-    let mut runs: Vec<(Engine, Run)> =
-        vec![(Engine::Golden, Box::new(|frame| Ok(measured.engine.run(frame).map(drop)?)))];
+    let mut runs: Vec<(Implementation, Run)> =
+        vec![(Implementation::Golden, Box::new(|frame| Ok(measured.engine.run(frame).map(drop)?)))];
     if let Ok((engine, _)) = &measured.evidence {
-        runs.push((Engine::Evidence, Box::new(|frame| Ok(engine.run(frame).map(drop)?))));
+        runs.push((Implementation::Evidence, Box::new(|frame| Ok(engine.run(frame).map(drop)?))));
     }
     if let Ok(bit_true) = &measured.bit_true {
-        runs.push((Engine::Fixed, Box::new(|frame| Ok(bit_true.model.reconstruct(frame).map(drop)?))));
+        runs.push((Implementation::Fixed, Box::new(|frame| Ok(bit_true.model.reconstruct(frame).map(drop)?))));
     }
     if let Some(literal) = &measured.literal {
-        runs.push((Engine::Baseline, Box::new(|frame| Ok(literal.run(frame).map(drop)?))));
+        runs.push((Implementation::Baseline, Box::new(|frame| Ok(literal.run(frame).map(drop)?))));
     }
-    let timed = |(engine, run): (Engine, Run)| Ok((engine, Timing::of(frames.len(), |k| run(&frames[k]))?));
+    let timed = |(engine, run): (Implementation, Run)| Ok((engine, Timing::of(frames.len(), |k| run(&frames[k]))?));
     runs.into_iter().map(timed).collect()
 }
 
@@ -175,9 +175,9 @@ mod tests {
         (scene.sensor.rows, scene.sensor.cols) = (16, 16);
         scene.hardware.board = Some("colorlight-i5".into());
         let error = Model::new(&scene).unwrap_err().to_string();
-        let told = in_one_line(&error);
-        assert!(error.lines().count() > 1 && !told.contains('\n'), "{error}");
-        assert!(error.lines().all(|line| told.contains(line.trim())), "{told}");
+        let one_line = in_one_line(&error);
+        assert!(error.lines().count() > 1 && !one_line.contains('\n'), "{error}");
+        assert!(error.lines().all(|line| one_line.contains(line.trim())), "{one_line}");
         assert_eq!(in_one_line("one"), "one");
     }
 }

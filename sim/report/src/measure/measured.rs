@@ -39,7 +39,7 @@ pub struct Options {
 
 /// An implementation of the reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Engine {
+pub enum Implementation {
     /// Eq. 1 with dense matrices and a simplex search, on the CPU.
     Baseline,
     /// The estimator of the hardware in floating point, on the CPU.
@@ -52,24 +52,30 @@ pub enum Engine {
     Hardware,
 }
 
-impl Engine {
+impl Implementation {
     /// All engines, in the order of tables.
-    pub const ALL: [Engine; 5] = [Engine::Baseline, Engine::Golden, Engine::Evidence, Engine::Fixed, Engine::Hardware];
+    pub const ALL: [Implementation; 5] = [
+        Implementation::Baseline,
+        Implementation::Golden,
+        Implementation::Evidence,
+        Implementation::Fixed,
+        Implementation::Hardware,
+    ];
 
     /// Whether it has results of its own in a case: evidence takes the array as a whole, as in case 0.
     pub fn is_of(self, case: Case) -> bool {
-        self != Engine::Evidence || case == Case::WHOLE
+        self != Implementation::Evidence || case == Case::WHOLE
     }
 
     /// Name in tables and legends, with that of the estimator that it computes for a scene.
     pub fn name(self, scene: &Scene) -> String {
         let of_hardware = scene.hardware_estimator().name();
         match self {
-            Engine::Baseline => "literal Eq. 1, CPU".to_owned(),
-            Engine::Golden => format!("golden {of_hardware}, CPU"),
-            Engine::Evidence => format!("golden {}, CPU", EstimatorKind::Evidence.name()),
-            Engine::Fixed => format!("bit-true {of_hardware}, CPU"),
-            Engine::Hardware => format!("hardware, {of_hardware}"),
+            Implementation::Baseline => "literal Eq. 1, CPU".to_owned(),
+            Implementation::Golden => format!("golden {of_hardware}, CPU"),
+            Implementation::Evidence => format!("golden {}, CPU", EstimatorKind::Evidence.name()),
+            Implementation::Fixed => format!("bit-true {of_hardware}, CPU"),
+            Implementation::Hardware => format!("hardware, {of_hardware}"),
         }
     }
 }
@@ -109,7 +115,7 @@ pub struct Measured {
     /// The literal baseline's forces for every frame, or the reason why it was not run.
     pub baseline: Result<Vec<Forces>, String>,
     /// Times per frame on the CPU.
-    pub times: BTreeMap<Engine, Timing>,
+    pub times: BTreeMap<Implementation, Timing>,
     pub(super) literal: Option<Baseline>,
 }
 
@@ -153,7 +159,7 @@ pub struct Point {
     /// The case.
     pub case: Case,
     /// The engine.
-    pub engine: Engine,
+    pub engine: Implementation,
     /// Its name with that of its estimator.
     pub name: String,
     /// Tangential error of the resultant, median over the frames.
@@ -172,29 +178,31 @@ pub struct Point {
 
 impl Measured {
     /// Errors of an engine's resultants, one per frame.
-    pub fn errors(&self, engine: Engine) -> Vec<Option<Errors>> {
+    pub fn errors(&self, engine: Implementation) -> Vec<Option<Errors>> {
         let own = |forces: &Vec<Forces>| {
             let pairs = self.frames.iter().zip(forces);
             pairs.map(|(frame, forces)| Some(Errors::new(frame.resultant_N?, forces.resultant()))).collect()
         };
         let of = |results: &[Reconstruction]| results.iter().map(|result| result.error).collect();
         match engine {
-            Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
-            Engine::Golden => of(&self.golden),
-            Engine::Evidence => self.evidence.as_ref().map(|(_, results)| of(results)).unwrap_or_default(),
-            Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
+            Implementation::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
+            Implementation::Golden => of(&self.golden),
+            Implementation::Evidence => self.evidence.as_ref().map(|(_, results)| of(results)).unwrap_or_default(),
+            Implementation::Fixed | Implementation::Hardware => {
+                self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default()
+            }
         }
     }
 
     /// Errors and time of an engine; `None` if it does not support the case.
-    pub fn point(&self, engine: Engine) -> Option<Point> {
+    pub fn point(&self, engine: Implementation) -> Option<Point> {
         self.point_over(engine, |_| true)
     }
 
     /// The same over the frames selected by `keep`.
-    pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
+    pub fn point_over(&self, engine: Implementation, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
         let seconds = match engine {
-            Engine::Hardware => {
+            Implementation::Hardware => {
                 let bit_true = self.bit_true.as_ref().ok()?;
                 clock(&bit_true.model.board, &self.scene).seconds(bit_true.cycles)
             }
@@ -212,7 +220,7 @@ impl Measured {
             normal: median(of(|e| e.normal)),
             ninety: [quantile(of(|e| e.tangential), 0.9), quantile(of(|e| e.normal), 0.9)],
             frames: errors.len(),
-            only_modelled: engine == Engine::Hardware && !simulated,
+            only_modelled: engine == Implementation::Hardware && !simulated,
             seconds,
         })
     }

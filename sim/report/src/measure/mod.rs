@@ -31,7 +31,7 @@ pub use devices::{devices, DeviceOptions, DeviceRow, Devices, CORE_W, DEVICE_FRA
 pub use engines::measure;
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
-pub use measured::{BitTrue, ContactCount, Engine, Measured, Options, Point};
+pub use measured::{BitTrue, ContactCount, Implementation, Measured, Options, Point};
 pub use noise::{noise, NoiseStudy};
 pub use objective_map::{objective_map, ObjectiveMap};
 pub use recordings::{recorded, Recorded, MOST_FRAMES};

@@ -20,7 +20,7 @@ pub struct NoiseStudy {
     /// Name of the scene.
     pub scene: String,
     /// Whether the scene states the noise.
-    pub told: bool,
+    pub noise_stated: bool,
     /// A row for each estimator and level.
     pub rows: Vec<ShapeRow>,
 }
@@ -36,10 +36,10 @@ pub fn noise(measured: &[Measured], options: &Options) -> Result<Vec<NoiseStudy>
     let first = measured.iter().find(|m| m.scene.partition.case == Case::WHOLE && !network(m));
     let most = if options.quick { 1 } else { usize::MAX };
     let networks = measured.iter().filter(|m| network(m) && m.bit_true.is_ok()).take(most);
-    let candidates = |scene: &Scene, told: bool| {
+    let candidates = |scene: &Scene, noise_stated: bool| {
         let mut candidates = vec![Candidate::Scene];
         let [sparse, patch] = [ObjectiveKind::Sparse, ObjectiveKind::Patch].map(Candidate::Objective);
-        let others = match told {
+        let others = match noise_stated {
             true => vec![Candidate::Estimator(EstimatorKind::Evidence), sparse, patch],
             false => vec![Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware],
         };
@@ -51,17 +51,22 @@ pub fn noise(measured: &[Measured], options: &Options) -> Result<Vec<NoiseStudy>
         candidates
     };
     let draws = DRAWN[usize::from(!options.quick)];
-    let study = |(m, told): (&Measured, bool)| {
+    let study = |(m, noise_stated): (&Measured, bool)| {
         let scene = &m.scene;
         let contacts = if scene.partition.case == Case::Contacts { CONTACTS } else { 1 };
         let converter = Converter { unipolar: scene.input.unipolar, ..Default::default() };
         let drawn = DrawOptions { contacts, converter, ..Default::default() };
-        let wanted =
-            ShapeStudy { draws, candidates: candidates(scene, told), told, options: drawn, ..Default::default() };
+        let wanted = ShapeStudy {
+            draws,
+            candidates: candidates(scene, noise_stated),
+            noise_stated,
+            options: drawn,
+            ..Default::default()
+        };
         let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
         let rows = shape_study(scene, &wanted, &|done, total| bar.set_of(done as u64, total as u64))?;
         options.interrupt.check()?;
-        Ok(NoiseStudy { scene: scene.name.clone(), told, rows })
+        Ok(NoiseStudy { scene: scene.name.clone(), noise_stated, rows })
     };
     first.map(|m| (m, true)).into_iter().chain(networks.map(|m| (m, false))).map(study).collect()
 }

@@ -16,7 +16,7 @@ const EXTREME_TAXELS: usize = 100;
 ///
 /// # Errors
 /// An interruption.
-pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
+pub fn conditions(options: &Options) -> Result<Vec<stability::StabilityRow>> {
     let in_quick = |setting: &Setting| {
         setting.frame.is_some() || setting.group == "thickness" && setting.scene.inverse.kind == InverseKind::default()
     };
@@ -29,7 +29,7 @@ pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
 ///
 /// # Errors
 /// A scene that the golden model refuses, an interruption.
-pub fn extremes(measured: &[Measured], options: &Options) -> Result<Vec<(String, Vec<extreme::Row>)>> {
+pub fn extremes(measured: &[Measured], options: &Options) -> Result<Vec<(String, Vec<extreme::ExtremeRow>)>> {
     let small = |m: &&Measured| m.scene.partition.case == Case::WHOLE && m.scene.sensor.taxels() <= EXTREME_TAXELS;
     let wanted: Vec<_> = measured.iter().filter(small).take(if options.quick { 1 } else { usize::MAX }).collect();
     parallel("extreme frames", wanted, options.jobs, &options.interrupt, |m| {

@@ -264,10 +264,18 @@ impl Names {
         let (width, height) = (text_width(name), 13);
         let corners = [(x + 6, y - 13), (x - 6 - width, y - 13), (x + 6, y + 1), (x - 6 - width, y + 1)];
         let free = |(left, top): &(i32, i32)| {
-            let own = [*left, *top, left + width, top + height];
-            let apart =
-                |other: &[i32; 4]| own[2] <= other[0] || other[2] <= own[0] || own[3] <= other[1] || other[3] <= own[1];
-            own[0] > LEFT && own[2] < RIGHT + 10 && own[1] > 0 && own[3] < BOTTOM && self.taken.iter().all(apart)
+            let rectangle = [*left, *top, left + width, top + height];
+            let apart = |other: &[i32; 4]| {
+                rectangle[2] <= other[0]
+                    || other[2] <= rectangle[0]
+                    || rectangle[3] <= other[1]
+                    || other[3] <= rectangle[1]
+            };
+            rectangle[0] > LEFT
+                && rectangle[2] < RIGHT + 10
+                && rectangle[1] > 0
+                && rectangle[3] < BOTTOM
+                && self.taken.iter().all(apart)
         };
         let Some((left, top)) = corners.into_iter().find(free).filter(|_| !name.is_empty()) else { return Ok(()) };
         self.taken.push([left, top, left + width, top + height]);

@@ -16,7 +16,7 @@ use super::super::document::{
     count, decimal, empty_cell, percent, percent_text, seconds, text_cell, Cell, Item, Section, Table,
 };
 use super::super::measure::{
-    clock, formats, BitTrue, Clock, ContactCount, Engine, FormatRow, Measured, Options, Point,
+    clock, formats, BitTrue, Clock, ContactCount, FormatRow, Implementation, Measured, Options, Point,
 };
 use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
@@ -79,7 +79,7 @@ pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
 fn best_case(measured: &[Measured], scene: &str, contact_count: ContactCount) -> Option<usize> {
     let own = measured.iter().enumerate().filter(|(_, m)| m.scene.name == scene);
     let point = |(index, m): (usize, &Measured)| {
-        let point = m.point_over(Engine::Hardware, |frame| ContactCount::of(frame) == contact_count)?;
+        let point = m.point_over(Implementation::Hardware, |frame| ContactCount::of(frame) == contact_count)?;
         (point.seconds <= 1e-6 * BUDGET_US as f64).then_some((index, point.tangential?, point.seconds))
     };
     let all: Vec<(usize, f64, f64)> = own.filter_map(point).collect();
@@ -270,7 +270,7 @@ fn compared(measured: &[Measured]) -> Table {
             let mut row = vec![text_cell(scene), text_cell(contact_count.name()), count(frames as u64)];
             for case in cases {
                 let m = own().find(|m| m.scene.partition.case.to_string() == case);
-                let engine = if case == "contacts" { Engine::Golden } else { Engine::Hardware };
+                let engine = if case == "contacts" { Implementation::Golden } else { Implementation::Hardware };
                 let point = m.and_then(|m| m.point_over(engine, |frame| ContactCount::of(frame) == contact_count));
                 let missing = if m.is_some() { "does not fit" } else { "–" };
                 row.extend(match point {

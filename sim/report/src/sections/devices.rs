@@ -59,22 +59,22 @@ pub fn device_table(devices: &Devices) -> Table {
     Table::new("devices", "Time and energy of a frame by estimator and device", &head, rows)
 }
 
-fn row(own: &DeviceRow) -> Vec<Cell> {
+fn row(device: &DeviceRow) -> Vec<Cell> {
     let energy = |ends: Option<[f64; 2]>| {
         ends.map_or_else(empty_cell, |ends| Cell { shown: range(ends), number: Some(ends[1]) })
     };
     vec![
-        text_cell(own.scene.clone()),
-        text_cell(own.estimator.clone()),
-        text_cell(own.device.clone()),
-        seconds(Some(own.median_s)),
-        seconds(own.most_s),
-        seconds(own.jitter_s),
-        own.ratio.map_or_else(empty_cell, |ratio| decimal(Some(ratio), if ratio < 10.0 { 2 } else { 0 })),
-        count(own.arrays),
-        energy(own.one_array_uJ),
-        energy(own.all_arrays_uJ),
-        count(own.frames as u64),
+        text_cell(device.scene.clone()),
+        text_cell(device.estimator.clone()),
+        text_cell(device.device.clone()),
+        seconds(Some(device.median_s)),
+        seconds(device.most_s),
+        seconds(device.jitter_s),
+        device.ratio.map_or_else(empty_cell, |ratio| decimal(Some(ratio), if ratio < 10.0 { 2 } else { 0 })),
+        count(device.arrays),
+        energy(device.one_array_uJ),
+        energy(device.all_arrays_uJ),
+        count(device.frames as u64),
     ]
 }
 

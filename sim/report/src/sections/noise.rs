@@ -15,9 +15,9 @@ use super::time::pictures as time_pictures;
 /// # Errors
 /// A picture that cannot be written.
 pub fn noise(measured: &[Measured], studies: &[NoiseStudy]) -> Result<Option<Section>> {
-    let (told, others): (Vec<&NoiseStudy>, Vec<&NoiseStudy>) = studies.iter().partition(|study| study.told);
+    let (stated, others): (Vec<&NoiseStudy>, Vec<&NoiseStudy>) = studies.iter().partition(|study| study.noise_stated);
     let mut items = Vec::new();
-    for study in &told {
+    for study in &stated {
         let time = time_pictures(&study.scene, measured)?.into_iter().next();
         let time = time.map(|time| Picture { id: format!("first-{}", time.id), ..time });
         items.push(Item::Text(
@@ -41,14 +41,14 @@ pub fn noise(measured: &[Measured], studies: &[NoiseStudy]) -> Result<Option<Sec
 }
 
 fn table(study: &NoiseStudy) -> Table {
-    let NoiseStudy { scene, told, rows } = study;
+    let NoiseStudy { scene, noise_stated, rows } = study;
     let (draws, contacts) = rows.first().map_or((0, 0), |row| (row.summary.draws, row.contacts));
     let caption = format!(
         "Shear error of the resultant on {draws} drawn frames of {scene} with {contacts} {} each (Hertz, punch, ring, rectangle \
          and tilted pressures in equal shares), noise {} in the scene; bound: Cramér–Rao for a smooth pressure on a known \
          support; none: no shear, and Σ b·area for the normal force",
         if contacts == 1 { "contact" } else { "contacts" },
-        if *told { "stated" } else { "not stated" },
+        if *noise_stated { "stated" } else { "not stated" },
     );
     let head = [
         "noise",
@@ -61,7 +61,7 @@ fn table(study: &NoiseStudy) -> Table {
         "flagged",
         "bound, median",
     ];
-    let id = if *told { "noise".to_owned() } else { format!("{scene}-noise") };
+    let id = if *noise_stated { "noise".to_owned() } else { format!("{scene}-noise") };
     Table::new(id, caption, &head, rows.iter().map(row).collect())
 }
 

@@ -14,7 +14,7 @@ use dermis_study::paper::conclusions;
 use super::super::document::{
     count, empty_cell, percent, seconds, text_cell, two_digits, Cell, Item, Picture, Section, Table,
 };
-use super::super::measure::{Engine, Measured, Options};
+use super::super::measure::{Implementation, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
 use super::fields::field_pictures;
@@ -130,12 +130,12 @@ fn figure_of_fields(measured: &[Measured], id: &'static str, title: &str, from: 
 
 /// Fig. 7: three repeats of computing the matrices and one frame in each case, as in the paper.
 fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
-    let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == "sensor-4").collect();
-    let bar = Progress::steps("Fig. 7", (REPEATS * own.len()) as u64);
+    let cases: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == "sensor-4").collect();
+    let bar = Progress::steps("Fig. 7", (REPEATS * cases.len()) as u64);
     // Without the matrix cache, so that computing the matrices is measured.
     cache::set_folder(None);
     let mut all: Vec<[f64; REPEATS]> = Vec::new();
-    for m in &own {
+    for m in &cases {
         let mut repeats = [0.0; REPEATS];
         for (k, repeat) in repeats.iter_mut().enumerate() {
             options.interrupt.check()?;
@@ -159,7 +159,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     let names = ["the paper", "first repeat", "second", "third"];
     let plot = Bars {
         axis: "s, matrices and one frame".into(),
-        groups: own.iter().zip(&all).map(group).collect(),
+        groups: cases.iter().zip(&all).map(group).collect(),
         series: names.iter().zip(&SERIES).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
         text: super::super::document::seconds_text,
         limit: None,
@@ -172,20 +172,20 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         svg: bars(&plot)?,
     };
     let middle = |repeats: &[f64; REPEATS]| median(repeats.to_vec());
-    let whole = own.iter().zip(&all).find(|(m, _)| m.scene.partition.case == Case::WHOLE);
-    let faster = |whole: Option<f64>, own: Option<f64>| match (whole, own) {
-        (Some(whole), Some(own)) => {
-            Cell { shown: format!("{} ×", two_digits(whole / own)), number: Some(whole / own) }
+    let whole = cases.iter().zip(&all).find(|(m, _)| m.scene.partition.case == Case::WHOLE);
+    let faster = |whole: Option<f64>, seconds: Option<f64>| match (whole, seconds) {
+        (Some(whole), Some(seconds)) => {
+            Cell { shown: format!("{} ×", two_digits(whole / seconds)), number: Some(whole / seconds) }
         }
         _ => empty_cell(),
     };
-    let rows = own.iter().zip(&all).map(|(m, repeats)| {
+    let rows = cases.iter().zip(&all).map(|(m, repeats)| {
         let mut row = vec![text_cell(case_text(m.scene.partition.case)), seconds(printed(m))];
         row.extend(repeats.map(|s| seconds(Some(s))));
         row.push(faster(whole.and_then(|(m, _)| printed(m)), printed(m)));
         row.push(faster(whole.and_then(|(_, repeats)| middle(repeats)), middle(repeats)));
         let frame = |engine| m.point(engine).map(|point| point.seconds);
-        row.extend([seconds(frame(Engine::Golden)), seconds(frame(Engine::Hardware))]);
+        row.extend([seconds(frame(Implementation::Golden)), seconds(frame(Implementation::Hardware))]);
         row
     });
     let head = [
@@ -260,7 +260,7 @@ fn conclusions_table(measured: &[Measured]) -> Table {
         let name = format!("sensor-{}", conclusion.sensor);
         let own = measured.iter().filter(|m| m.scene.name == name);
         let errors: Vec<(Case, f64)> =
-            own.filter_map(|m| Some((m.scene.partition.case, m.point(Engine::Golden)?.tangential?))).collect();
+            own.filter_map(|m| Some((m.scene.partition.case, m.point(Implementation::Golden)?.tangential?))).collect();
         let least = |cut: bool| {
             let all = errors.iter().filter(|(case, _)| !cut || *case != Case::WHOLE);
             all.min_by(|a, b| a.1.total_cmp(&b.1)).copied()

@@ -10,7 +10,7 @@ use super::super::document::{
     count, empty_cell, median_percent, percent, percent_text, seconds, text_cell, two_digits, Cell, Item, Section,
     Table,
 };
-use super::super::measure::{ContactCount, Engine, Measured};
+use super::super::measure::{ContactCount, Implementation, Measured};
 use super::lookup::{case_text, find};
 
 /// The section with Table 2 and the published run times.
@@ -59,7 +59,7 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         let mut row = vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case))];
         row.push(text_cell(contacts.name()));
         row.extend(paper.map(|x| percent(Some(x))));
-        for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
+        for errors in [m.errors(Implementation::Golden), to_whole, m.errors(Implementation::Fixed)] {
             let error = |frame: usize, k: usize| errors.get(frame)?.as_ref()?.axes()[k].map(f64::abs);
             row.extend((0..3).map(|k| median_percent(frames.iter().map(|&frame| error(frame, k)))));
         }
@@ -100,8 +100,8 @@ pub(super) fn times(measured: &[Measured]) -> Table {
     ];
     let rows = run_times().into_iter().map(|published| {
         let own = measured.iter().find(|m| fits(m, &published));
-        let time = |engine: Engine| own.and_then(|m| m.point(engine)).map(|point| point.seconds);
-        let ratio = |engine: Engine| match time(engine) {
+        let time = |engine: Implementation| own.and_then(|m| m.point(engine)).map(|point| point.seconds);
+        let ratio = |engine: Implementation| match time(engine) {
             None => empty_cell(),
             Some(own) => {
                 let ratio = published.seconds / own;
@@ -111,8 +111,12 @@ pub(super) fn times(measured: &[Measured]) -> Table {
         let case = published.case.map_or_else(empty_cell, |case| text_cell(case_text(case)));
         let mut row = vec![text_cell(published.sensor.clone()), case, text_cell(published.system.clone())];
         row.push(seconds(Some(published.seconds)));
-        row.extend(Engine::ALL.map(|engine| seconds(time(engine))));
-        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), text_cell(published.source.clone())]);
+        row.extend(Implementation::ALL.map(|engine| seconds(time(engine))));
+        row.extend([
+            ratio(Implementation::Golden),
+            ratio(Implementation::Hardware),
+            text_cell(published.source.clone()),
+        ]);
         row
     });
     let caption =

@@ -2,7 +2,7 @@
 
 use anyhow::{anyhow, Result};
 use dermis_golden::spec::scene::InverseKind;
-use dermis_study::stability::{extreme, FormatErrors, Row};
+use dermis_study::stability::{extreme, FormatErrors, StabilityRow};
 
 use super::super::document::{Item, Picture, Section};
 use super::super::extremes::extremes_table;
@@ -19,7 +19,7 @@ const SHOWN: [f64; 2] = [1e-16, 1e3];
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn stability(rows: &[Row]) -> Result<Section> {
+pub fn stability(rows: &[StabilityRow]) -> Result<Section> {
     let text =
         "The stress of known forces is computed in extended precision and without noise, so that all errors come from \
                  the inverse and the arithmetic. By default singular values below the resolution of input, noise and \
@@ -32,7 +32,7 @@ pub fn stability(rows: &[Row]) -> Result<Section> {
 }
 
 /// The section with results on extreme frames, by scene name.
-pub fn extremes(all: &[(String, Vec<extreme::Row>)]) -> Section {
+pub fn extremes(all: &[(String, Vec<extreme::ExtremeRow>)]) -> Section {
     let text =
         "Each of these frames has a defined result in both models; the tests check that the hardware equals the \
                 bit-true model on them in every bit and cycle.";
@@ -41,7 +41,7 @@ pub fn extremes(all: &[(String, Vec<extreme::Row>)]) -> Section {
     Section { id: "extremes", title: "Extreme frames".into(), items }
 }
 
-type Format = (&'static str, fn(&Row) -> Option<FormatErrors>);
+type Format = (&'static str, fn(&StabilityRow) -> Option<FormatErrors>);
 const FORMATS: [Format; 3] = [("f64", |row| row.double), ("f32", |row| row.single), ("fixed", |row| row.fixed)];
 type Error = (&'static str, fn(&FormatErrors) -> Option<f64>);
 const ERRORS: [Error; 2] = [("forward", |figures| Some(figures.forward)), ("e_n", |figures| figures.normal)];
@@ -50,7 +50,7 @@ const ERRORS: [Error; 2] = [("forward", |figures| Some(figures.forward)), ("e_n"
 ///
 /// # Errors
 /// No row has a condition number, or the picture cannot be written.
-pub fn stability_picture(rows: &[Row]) -> Result<String> {
+pub fn stability_picture(rows: &[StabilityRow]) -> Result<String> {
     if rows.iter().all(|row| row.spectrum.is_none()) {
         return Err(anyhow!("--plot: no scene has a condition number to plot"));
     }
@@ -58,11 +58,11 @@ pub fn stability_picture(rows: &[Row]) -> Result<String> {
 }
 
 /// Forward and normal error against condition number, one mark per scene and number format.
-fn picture(rows: &[Row]) -> Result<String> {
+fn picture(rows: &[StabilityRow]) -> Result<String> {
     let exact = InverseKind::Exact.name();
     let series = FORMATS.into_iter().zip(1..).flat_map(|((format, figures), colour)| {
         ERRORS.into_iter().zip([0, 2]).map(move |((what, error), shape)| {
-            let point = |row: &Row| {
+            let point = |row: &StabilityRow| {
                 let error = error(&figures(row)?)?.clamp(SHOWN[0], SHOWN[1]);
                 let name = if row.inverse == exact { exact } else { "" };
                 Some((row.spectrum?.condition, error, name.to_owned())).filter(|point| point.0.is_finite())

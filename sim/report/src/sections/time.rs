@@ -6,7 +6,7 @@ use dermis_golden::data::frame::Frame;
 use super::super::document::{
     count, empty_cell, percent, seconds, seconds_text, text_cell, two_digits, Cell, Item, Picture, Section, Table,
 };
-use super::super::measure::{ContactCount, Engine, Measured, Point};
+use super::super::measure::{ContactCount, Implementation, Measured, Point};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::super::BUDGET_US;
@@ -42,7 +42,7 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
     ];
     let rows = measured.iter().flat_map(|m| {
         let counts = ContactCount::all_of(&m.frames);
-        let engines = Engine::ALL.into_iter().filter(|engine| engine.is_of(m.scene.partition.case));
+        let engines = Implementation::ALL.into_iter().filter(|engine| engine.is_of(m.scene.partition.case));
         counts.into_iter().flat_map(move |contacts| engines.clone().map(move |engine| row(m, engine, contacts)))
     });
     items.insert(
@@ -77,7 +77,9 @@ pub fn pictures(scene: &str, measured: &[Measured]) -> Result<Vec<Picture>> {
     let mut pictures = Vec::new();
     for contacts in own.first().map(|m| ContactCount::all_of(&m.frames)).unwrap_or_default() {
         let keep = |frame: &Frame| ContactCount::of(frame) == contacts;
-        let all = own.iter().flat_map(|m| Engine::ALL.into_iter().filter_map(move |engine| m.point_over(engine, keep)));
+        let all = own
+            .iter()
+            .flat_map(|m| Implementation::ALL.into_iter().filter_map(move |engine| m.point_over(engine, keep)));
         let points: Vec<Point> = all.collect();
         let sum = own.iter().find_map(|m| m.error_of_sum(contacts));
         let shear = ("shear", "no shear", Some(1.0));
@@ -87,7 +89,7 @@ pub fn pictures(scene: &str, measured: &[Measured]) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
-fn row(m: &Measured, engine: Engine, contacts: ContactCount) -> Vec<Cell> {
+fn row(m: &Measured, engine: Implementation, contacts: ContactCount) -> Vec<Cell> {
     let mut row = vec![
         text_cell(m.scene.name.clone()),
         text_cell(case_text(m.scene.partition.case)),
@@ -97,8 +99,8 @@ fn row(m: &Measured, engine: Engine, contacts: ContactCount) -> Vec<Cell> {
     let bit_true = m.bit_true.as_ref();
     let Some(point) = m.point_over(engine, |frame| ContactCount::of(frame) == contacts) else {
         let reason = match engine {
-            Engine::Baseline => m.baseline.as_ref().err(),
-            Engine::Evidence => m.evidence.as_ref().err(),
+            Implementation::Baseline => m.baseline.as_ref().err(),
+            Implementation::Evidence => m.evidence.as_ref().err(),
             _ => bit_true.err(),
         };
         row.extend(std::iter::repeat_with(empty_cell).take(8));
@@ -109,7 +111,7 @@ fn row(m: &Measured, engine: Engine, contacts: ContactCount) -> Vec<Cell> {
     row.extend([percent(point.tangential), shear, percent(point.normal), normal]);
     row.extend([count(point.frames as u64), seconds(Some(point.seconds))]);
     row.extend(match bit_true {
-        Ok(bit_true) if engine == Engine::Hardware => {
+        Ok(bit_true) if engine == Implementation::Hardware => {
             let equality = match bit_true.equal {
                 Some(true) => "yes",
                 Some(false) => "NO",
@@ -131,7 +133,7 @@ fn picture(
     own: &[Point],
     error: fn(&Point) -> Option<f64>,
 ) -> Result<Picture> {
-    let of = |(engine, hollow): (Engine, bool)| {
+    let of = |(engine, hollow): (Implementation, bool)| {
         let points = own.iter().filter(|point| point.engine == engine && point.only_modelled == hollow);
         // A logarithmic axis has no zero.
         let points = points
@@ -149,7 +151,7 @@ fn picture(
             joined: false,
         }
     };
-    let kinds = Engine::ALL.map(|engine| (engine, false)).into_iter().chain([(Engine::Hardware, true)]);
+    let kinds = Implementation::ALL.map(|engine| (engine, false)).into_iter().chain([(Implementation::Hardware, true)]);
     let series: Vec<Series> = kinds.map(of).filter(|series| !series.points.is_empty()).collect();
     let all = series.iter().flat_map(|series| &series.points).map(|(x, y, _)| (*x, *y)).collect();
     let budget = 1e-6 * BUDGET_US as f64;

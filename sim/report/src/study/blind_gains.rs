@@ -17,11 +17,11 @@ const LEGEND: &str = "rough, smooth: root mean square of the part of the log gai
 ///
 /// # Errors
 /// A scene that cannot be loaded, and as [`blind_study`].
-pub fn run(scene: &str, asked: &BlindStudy, json: bool) -> Result<String> {
+pub fn run(scene: &str, study: &BlindStudy, json: bool) -> Result<String> {
     let scene = Scene::load(scene)?;
     let bar = Progress::share("gains");
     let share = |done: usize, all: usize| bar.set_share(done as f64 / all as f64);
-    let rows = blind_study(&scene, asked, &share)?;
+    let rows = blind_study(&scene, study, &share)?;
     drop(bar);
     if json {
         return Ok(serde_json::to_string(&rows)? + "\n");

@@ -24,7 +24,7 @@ const MOST: f64 = 0.9;
 
 /// A scene with its dead taxels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct DeadTaxelRow {
     /// Median tangential error of the golden model, a fraction.
     pub golden: Option<f64>,
     /// The bit-true model's.
@@ -52,14 +52,14 @@ pub fn masked(name: &str, dead: &[[usize; 2]]) -> Result<Scene> {
 ///
 /// # Errors
 /// A scene that one of the models refuses.
-pub fn measure(scene: &Scene) -> Result<Row> {
+pub fn measure(scene: &Scene) -> Result<DeadTaxelRow> {
     let (model, golden) = (Model::new(scene)?, Golden::reference(scene)?);
     let frames = one_contact(scene)?;
     let float: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame)).collect::<Result<_, _>>()?;
     let fixed: Vec<Reconstruction> = frames.iter().map(|frame| model.reconstruct(frame)).collect::<Result<_, _>>()?;
     let apart = |(a, b): (&Reconstruction, &Reconstruction)| difference(&a.forces_N, &b.forces_N, 1.0).max_share;
     let shares: Vec<f64> = float.iter().zip(&fixed).map(apart).collect();
-    Ok(Row {
+    Ok(DeadTaxelRow {
         golden: tangential(&float),
         fixed: tangential(&fixed),
         apart: median(shares.clone()),

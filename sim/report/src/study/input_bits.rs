@@ -28,7 +28,7 @@ pub const BITS: [u32; 2] = [20, 16];
 
 /// A scene at one width of its input.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct InputBitsRow {
     /// The scene, with the board where that is another one than its own.
     pub scene: String,
     /// Width of a code.
@@ -64,7 +64,7 @@ pub fn scenes(names: &[String]) -> Result<Vec<(String, Scene)>> {
 ///
 /// # Errors
 /// A scene that one of the models refuses.
-pub fn measure(name: &str, scene: &Scene) -> Result<Vec<Row>> {
+pub fn measure(name: &str, scene: &Scene) -> Result<Vec<InputBitsRow>> {
     let frames = one_contact(scene)?;
     let row = |bits: u32| {
         let mut scene = scene.clone();
@@ -78,7 +78,7 @@ pub fn measure(name: &str, scene: &Scene) -> Result<Vec<Row>> {
         let codes: Vec<Frame> = frames.iter().map(|frame| quantised(&scene, frame)).collect();
         let fixed: Vec<_> = frames.iter().map(|frame| model.reconstruct(frame)).collect::<Result<_, _>>()?;
         let (float, codes) = (float(&frames)?, float(&codes)?);
-        Ok(Row { scene: name.to_owned(), bits, float, codes, fixed: tangential(&fixed) })
+        Ok(InputBitsRow { scene: name.to_owned(), bits, float, codes, fixed: tangential(&fixed) })
     };
     BITS.into_iter().map(row).collect()
 }
@@ -100,7 +100,7 @@ pub fn run(names: &[String]) -> Result<String> {
         let _progress = Progress::start(&format!("{name}: input bits"));
         lines.extend(measure(&name, &scene)?);
     }
-    let line = |row: Row| {
+    let line = |row: InputBitsRow| {
         let errors = [row.float, row.codes, row.fixed].map(percent);
         [vec![row.scene, format!("{} bits", row.bits)], errors.to_vec()].concat()
     };

@@ -48,14 +48,14 @@ pub fn sums(rows: &[FaultRow]) -> Vec<Sum> {
 ///
 /// # Errors
 /// A scene that cannot be loaded, and as [`sensor_faults`].
-pub fn run(scenes: &[String], asked: &SensorFaults, json: bool) -> Result<String> {
+pub fn run(scenes: &[String], study: &SensorFaults, json: bool) -> Result<String> {
     let names: Vec<&str> = match scenes {
         [] => SCENES.to_vec(),
         names => names.iter().map(String::as_str).collect(),
     };
     let scenes = names.into_iter().map(Scene::load).collect::<Result<Vec<_>, _>>()?;
     let bar = Progress::steps("sensor faults", 0);
-    let rows = sensor_faults(&scenes, asked, &|done, total| bar.set_of(done as u64, total as u64))?;
+    let rows = sensor_faults(&scenes, study, &|done, total| bar.set_of(done as u64, total as u64))?;
     drop(bar);
     match json {
         true => Ok(serde_json::to_string(&serde_json::json!({ "rows": rows, "sums": sums(&rows) }))? + "\n"),

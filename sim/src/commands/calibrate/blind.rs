@@ -14,7 +14,7 @@ use dermis_report as report;
 
 /// The JSON of the command.
 #[derive(Serialize)]
-struct Answer<'a> {
+struct BlindCalibrationJson<'a> {
     scene: &'a str,
     table: Option<String>,
     offset: &'a [f64],
@@ -44,6 +44,7 @@ impl Arguments {
         }
         let table = self.out.as_ref().map(|out| out.display().to_string());
         let (offset, gain) = (&gains.table.offset, &gains.table.gain);
-        Ok(serde_json::to_string(&Answer { scene: &scene.name, table, offset, gain, found: &gains })? + "\n")
+        Ok(serde_json::to_string(&BlindCalibrationJson { scene: &scene.name, table, offset, gain, found: &gains })?
+            + "\n")
     }
 }

@@ -54,7 +54,7 @@ fn board(simulators: &[Simulator]) -> Board {
 impl Board {
     /// The codes of an answer, which must be the model's result for them.
     fn scanned(&self, packet: &Packet) -> Vec<i32> {
-        let answer = Answer::of_bytes(&self.model, &packet.payload, packet.kind == Kind::Forces).unwrap();
+        let answer = BoardAnswer::of_bytes(&self.model, &packet.payload, packet.kind == Kind::Forces).unwrap();
         assert_eq!(answer.compare_with_model(&self.model, &answer.codes), None);
         let readings = self.model.readings_of("scan", &answer.codes).unwrap();
         assert_eq!(self.model.readings(&[readings]).unwrap(), answer.codes);
@@ -132,7 +132,7 @@ fn tables_come_in_a_packet_while_the_array_is_scanned() {
     assert_eq!(board.receive(), []);
     board.send(&Packet::request(Kind::FrameForForces, 8).to_wire());
     let answer = board.receive().remove(0);
-    let answer = Answer::of_bytes(&board.model, &answer.payload, true).unwrap();
+    let answer = BoardAnswer::of_bytes(&board.model, &answer.payload, true).unwrap();
     let mut spoiled = hardware.clone();
     assert_eq!(spoiled.load(&board.model.image()[..50]), Outcome::Broken);
     assert_eq!(answer.compare_with_model(&spoiled, &answer.codes), None);

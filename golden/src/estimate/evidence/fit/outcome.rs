@@ -3,13 +3,13 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: posterior of the last round | – | – |
-//! | out: [`Estimate`], and what it leaves of the readings | – | N per MPa of the peak |
+//! | out: [`EvidenceEstimate`], and what it leaves of the readings | – | N per MPa of the peak |
 
 use super::{Fit, Fitted, Found, Predicted, FLOOR};
 use crate::data::frame::Forces;
 use crate::estimate::evidence::ascent::Top;
 use crate::estimate::evidence::contact::forces;
-use crate::estimate::evidence::estimate::Estimate;
+use crate::estimate::evidence::estimate::EvidenceEstimate;
 use crate::estimate::evidence::regions::Regions;
 use crate::estimate::evidence::residual::Residual;
 use crate::result::reconstruct::ContactEstimate;
@@ -60,7 +60,7 @@ impl Fit<'_> {
         let known = self.taxels.len() - self.clipped.len() - self.missing.len();
         let misfit_probability = self.stated.then(|| chi_square_tail(top.posterior.square, known as f64));
         let (noise_MPa, rank) = (self.now.sigma, regions.design.rank());
-        let estimate = Estimate {
+        let estimate = EvidenceEstimate {
             contacts,
             forces_N: on_taxels,
             noise_MPa,
@@ -68,13 +68,13 @@ impl Fit<'_> {
             rounds: self.round,
             rank,
             work: self.work,
-            ..Estimate::default()
+            ..EvidenceEstimate::default()
         };
         Some(self.fitted(estimate, regions, top))
     }
 
     /// The estimate with what it leaves of the readings.
-    fn fitted(mut self, estimate: Estimate, regions: &Regions, top: &Top) -> Fitted {
+    fn fitted(mut self, estimate: EvidenceEstimate, regions: &Regions, top: &Top) -> Fitted {
         let design = &regions.design;
         let stress = top.posterior.stress(&self.readings);
         let sensor = &self.scene.cells.sensor;
@@ -102,7 +102,7 @@ impl Fit<'_> {
             evidence: top.posterior.value,
             wide: regions.wide,
             load: load * sensor.pitch_x_mm * sensor.pitch_y_mm,
-            estimate: Estimate {
+            estimate: EvidenceEstimate {
                 baseline_MPa: square.sqrt(),
                 outlier: worst.map(|(_, size)| size),
                 residual_correlation: Some(correlation),

@@ -26,22 +26,22 @@ impl Fit<'_> {
     pub(super) fn regions(&self, least: f64) -> Regions {
         let mut of_contact = Vec::new();
         for contact in 0..self.now.mu.len() {
-            let own = |(p, label): (&f64, &usize)| if *label == contact { *p } else { 0.0 };
-            let e = self.scene.envelopes.of(self.now.p.iter().zip(&self.now.labels).map(own), self.now.sigma);
-            let own: Vec<usize> =
+            let pressure = |(p, label): (&f64, &usize)| if *label == contact { *p } else { 0.0 };
+            let e = self.scene.envelopes.of(self.now.p.iter().zip(&self.now.labels).map(pressure), self.now.sigma);
+            let cells: Vec<usize> =
                 (0..e.len()).filter(|&cell| e[cell] > 0.0 && self.now.labels[cell] == contact).collect();
-            let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
-            of_contact.push((own, on_own));
+            let envelope: Vec<f64> = cells.iter().map(|&cell| e[cell]).collect();
+            of_contact.push((cells, envelope));
         }
         let remainder = remainder(self.now.sigma).max(least);
-        let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
-        let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
-            let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
-            let (factor, rest) = self.scene.shape.factor(own, on_own, remainder, most);
+        let loaded: usize = of_contact.iter().map(|(cells, _)| cells.len()).sum();
+        let of = |(cells, envelope): &(Vec<usize>, Vec<f64>)| {
+            let most = (self.taxels.len() * cells.len() / loaded.max(1)).max(LEAST_RANK);
+            let (factor, rest) = self.scene.shape.factor(cells, envelope, remainder, most);
             (rest > WIDE, factor)
         };
         let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
-        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(own, _)| own).collect();
+        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(cells, _)| cells).collect();
         let design = self.design(&of_contact, &factors);
         Regions { cells: of_contact, factors, design, wide: cut.contains(&true) }
     }

@@ -10,7 +10,7 @@
 //! ellipse's pressure over each cell, scaled to its load; a cell under two ellipses belongs to the one with the larger
 //! force on it.
 
-use super::{Contacts, MeasuredStress, Solver};
+use super::{MeasuredStress, SolvedContacts, Solver};
 use crate::estimate::float::objective::misfit_limit;
 use crate::estimate::float::objective::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use crate::estimate::float::search::{SearchResult, RADIUS};
@@ -22,7 +22,7 @@ const MU_TOLERANCE: f64 = 0.05;
 impl Solver<'_> {
     /// The best fit of ellipses to the stress, started from the regions of `state`; `None` where no fit is wanted or
     /// found.
-    pub(super) fn fit(&self, state: &Contacts) -> Option<EllipseFit> {
+    pub(super) fn fit(&self, state: &SolvedContacts) -> Option<EllipseFit> {
         let MeasuredStress { taxels, b, noise_MPa } = self.stress?;
         let sensor = &self.matrices.sensor;
         // Starts with equally many regions lead to the same fit.
@@ -41,7 +41,7 @@ impl Solver<'_> {
     }
 
     /// The contacts of a fit that explains the stress; for a single ellipse `state`, if that has a single region too.
-    pub(super) fn contacts_of_fit(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
+    pub(super) fn contacts_of_fit(&self, fitted: &EllipseFit, state: &SolvedContacts) -> Option<SolvedContacts> {
         match fitted.patches.len() {
             _ if !fitted.explains_stress() => None,
             1 => (state.segments.count == 1).then(|| state.clone()),
@@ -51,7 +51,7 @@ impl Solver<'_> {
 
     /// The regions of the ellipses, each with the forces of its ellipse; `None` where a region has no force, is not to
     /// be searched or exceeds mu_max.
-    fn ellipse_contacts(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
+    fn ellipse_contacts(&self, fitted: &EllipseFit, state: &SolvedContacts) -> Option<SolvedContacts> {
         let sensor = &self.matrices.sensor;
         let cells = fitted.cells(sensor);
         let labels = fitted.labels(sensor);
@@ -77,6 +77,12 @@ impl Solver<'_> {
         }
         let objective = self.objective.score(&p)?;
         found.iter_mut().flatten().for_each(|found| found.objective = objective);
-        (filled == segments.count).then_some(Contacts { segments, found, p, sweeps: state.sweeps, converged: true })
+        (filled == segments.count).then_some(SolvedContacts {
+            segments,
+            found,
+            p,
+            sweeps: state.sweeps,
+            converged: true,
+        })
     }
 }

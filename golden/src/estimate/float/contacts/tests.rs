@@ -32,7 +32,7 @@ fn pressed(matrices: &Matrices, spheres: &[([f64; 2], [f64; 2])]) -> (Vec<f64>, 
     (p, b)
 }
 
-fn solve(matrices: &Matrices, b: &[f64], searched: &dyn Fn(&Segments, usize) -> bool) -> Contacts {
+fn solve(matrices: &Matrices, b: &[f64], searched: &dyn Fn(&Segments, usize) -> bool) -> SolvedContacts {
     let family = Polynomial::new(matrices, b);
     let objective = &Sparse::default();
     let found = search(&family, 0.6, &|p| objective.score(p)).unwrap();
@@ -123,7 +123,7 @@ fn contacts_that_are_no_ellipses_are_searched_in_the_best_regions() {
         searched: &|_, _| true,
     };
     let contacts = solve(&matrices, &b, &|_, _| true);
-    let score = |contacts: &Contacts| objective.score(&contacts.p);
+    let score = |contacts: &SolvedContacts| objective.score(&contacts.p);
     // The ellipses' regions are one more segmentation; their forces come from the search, not from the fit.
     assert!(score(&contacts) >= score(&plain.solve(&family, found)));
     let left = contacts.segments.labels[8 * 16 + 6].unwrap();

@@ -17,7 +17,7 @@
 //!
 //! σ is the noise after averaging. If the scene states too small a σ, a noisy frame is taken for one of another shape.
 
-use super::estimate::{Estimate, Objective, SearchInput};
+use super::estimate::{MuEstimate, Objective, SearchInput};
 use super::fit::misfit_limit;
 use super::patch::Patch;
 use super::sparse::Sparse;
@@ -49,13 +49,13 @@ impl Objective for Auto {
         self.sparse.score(p)
     }
 
-    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+    fn find(&self, input: &SearchInput) -> Option<MuEstimate> {
         let peak = input.b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
         let most = misfit_limit(input.b, input.noise_MPa);
         // The objective of a fit is its negative misfit.
-        let explains = |estimate: &Estimate| -estimate.found.objective <= most;
+        let explains = |estimate: &MuEstimate| -estimate.found.objective <= most;
         let mut evaluations = 0;
-        let mut counted = |estimate: Option<Estimate>| {
+        let mut counted = |estimate: Option<MuEstimate>| {
             evaluations += estimate.map_or(0, |estimate| estimate.found.evaluations);
             estimate.map(|mut estimate| {
                 estimate.found.evaluations = evaluations;
@@ -72,7 +72,7 @@ impl Objective for Auto {
         let symmetric = counted(self.symmetric.find(input));
         match (patch, symmetric) {
             (Some(patch), Some(symmetric)) if patch.found.objective > symmetric.found.objective => {
-                counted(Some(Estimate { found: SearchResult { evaluations: 0, ..patch.found }, ..patch }))
+                counted(Some(MuEstimate { found: SearchResult { evaluations: 0, ..patch.found }, ..patch }))
             }
             (patch, symmetric) => symmetric.or(patch),
         }
@@ -89,10 +89,10 @@ mod tests {
 
     /// The estimate of `auto` and those of the three objectives it chooses from.
     struct Four {
-        auto: Option<Estimate>,
-        patch: Option<Estimate>,
-        sparse: Option<Estimate>,
-        symmetric: Option<Estimate>,
+        auto: Option<MuEstimate>,
+        patch: Option<MuEstimate>,
+        sparse: Option<MuEstimate>,
+        symmetric: Option<MuEstimate>,
     }
 
     /// All four estimates for a frame of `sensor-2`; `noise` is stated as a fraction of its peak.
@@ -109,14 +109,14 @@ mod tests {
         }
     }
 
-    fn evaluations(estimates: &[Option<Estimate>]) -> usize {
+    fn evaluations(estimates: &[Option<MuEstimate>]) -> usize {
         estimates.iter().flatten().map(|estimate| estimate.found.evaluations).sum()
     }
 
     /// Whether two estimates are equal except for their number of evaluations.
-    fn same(a: Option<Estimate>, b: Option<Estimate>) -> bool {
+    fn same(a: Option<MuEstimate>, b: Option<MuEstimate>) -> bool {
         let bare =
-            |estimate: Estimate| Estimate { found: SearchResult { evaluations: 0, ..estimate.found }, ..estimate };
+            |estimate: MuEstimate| MuEstimate { found: SearchResult { evaluations: 0, ..estimate.found }, ..estimate };
         a.map(bare) == b.map(bare)
     }
 
@@ -157,7 +157,8 @@ mod tests {
             two.stress_MPa.iter_mut().zip(ring.stress_MPa.iter().rev()).for_each(|(b, other)| *b += 0.5 * other);
             for frame in [frame, &two] {
                 let found = four(&matrices, frame, noise);
-                let objective = |estimate: Option<Estimate>| estimate.map_or(f64::NEG_INFINITY, |e| e.found.objective);
+                let objective =
+                    |estimate: Option<MuEstimate>| estimate.map_or(f64::NEG_INFINITY, |e| e.found.objective);
                 if found.auto == found.patch {
                     continue;
                 }

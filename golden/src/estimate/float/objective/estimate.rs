@@ -20,9 +20,9 @@ pub trait Objective {
 
     /// The best μ of a subarray, `None` if no candidate has a score. By default the shared search over the scores; an
     /// objective may have its own method.
-    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+    fn find(&self, input: &SearchInput) -> Option<MuEstimate> {
         let found = search(input.family, input.mu_max, &|p| self.score(p))?;
-        Some(Estimate { found, load_N: None, sigma: None })
+        Some(MuEstimate { found, load_N: None, sigma: None })
     }
 }
 
@@ -43,7 +43,7 @@ pub struct SearchInput<'a> {
 
 /// The best μ, and the load if the objective finds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct MuEstimate {
     /// μ, score and evaluations.
     pub found: SearchResult,
     /// Normal load in N to which the forces are scaled; `None` leaves them as they are.
@@ -99,19 +99,19 @@ impl SearchInput<'_> {
     }
 }
 
-impl Estimate {
-    /// What a network says of μ: its mean, standard deviation, and the mean's position on the search grid. The objective is ln
+impl MuEstimate {
+    /// A normal density of μ: its mean, standard deviation, and the mean's position on the search grid. The objective is ln
     /// of the density at the mean.
-    pub fn told(mu: [f64; 2], sigma: [f64; 2], position: [i32; 2]) -> Estimate {
+    pub fn of_density(mu: [f64; 2], sigma: [f64; 2], position: [i32; 2]) -> MuEstimate {
         let objective = -sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
         let found = SearchResult { mu, position, objective, evaluations: 1 };
-        Estimate { found, load_N: None, sigma: Some(sigma) }
+        MuEstimate { found, load_N: None, sigma: Some(sigma) }
     }
 
-    /// What a network says of μ, at the nearest position of the search grid.
-    pub fn of_network(told: &Gaussian, mu_max: f64) -> Estimate {
-        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / mu_max).round() as i32);
-        Estimate::told(told.mean, told.sigma, position)
+    /// The output of a network, at the nearest position of the search grid.
+    pub fn of_network(output: &Gaussian, mu_max: f64) -> MuEstimate {
+        let position = output.mean.map(|mu| (mu * f64::from(RADIUS) / mu_max).round() as i32);
+        MuEstimate::of_density(output.mean, output.sigma, position)
     }
 
     /// Standard deviation of the shear over its size, that of a hundredth of the normal force at least, if σ is known.
@@ -138,7 +138,7 @@ impl Estimate {
 
     /// The estimate for a contact force in N, [x, y, normal]; `None` if it is not compressive. Shear beyond `mu_max` is
     /// reduced to it.
-    pub(super) fn of_force(force: [f64; 3], mu_max: f64, objective: f64, evaluations: usize) -> Option<Estimate> {
+    pub(super) fn of_force(force: [f64; 3], mu_max: f64, objective: f64, evaluations: usize) -> Option<MuEstimate> {
         let [x, y, load] = force;
         if !(load > 0.0 && force.iter().all(|f| f.is_finite())) {
             return None;
@@ -149,6 +149,10 @@ impl Estimate {
         // The position on the search grid, rounded towards 0.
         let unit = f64::from(RADIUS) / mu_max.max(f64::MIN_POSITIVE);
         let position = mu.map(|mu| (mu * unit) as i32);
-        Some(Estimate { found: SearchResult { mu, position, objective, evaluations }, load_N: Some(load), sigma: None })
+        Some(MuEstimate {
+            found: SearchResult { mu, position, objective, evaluations },
+            load_N: Some(load),
+            sigma: None,
+        })
     }
 }

@@ -221,16 +221,16 @@ fn add_ellipse(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
     let mut added = theta.to_vec();
     added.extend([x, y, depth, depth, 0.0, START_EXPONENT]);
     let mut cut = theta.to_vec();
-    let off = |own: &[f64]| (own[0] - x).hypot(own[1] - y) - own[2].max(own[3]);
+    let off = |ellipse: &[f64]| (ellipse[0] - x).hypot(ellipse[1] - y) - ellipse[2].max(ellipse[3]);
     let nearest = theta.chunks(PARAMETERS).enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-    if let Some((k, own)) = nearest {
-        let (a, b, c) = (own[2], own[3], own[4]);
+    if let Some((k, ellipse)) = nearest {
+        let (a, b, c) = (ellipse[2], ellipse[3], ellipse[4]);
         let (mean, apart) = ((a + b) / 2.0, ((a - b) / 2.0).hypot(c));
         let (long, short) = (mean + apart, mean - apart);
         let angle = 0.5 * c.atan2((a - b) / 2.0);
         let [dx, dy] = [angle.cos() * long / 2.0, angle.sin() * long / 2.0];
         let radius = (long / 2.0).max(short / 2.0);
-        let half = |sign: f64| [own[0] + sign * dx, own[1] + sign * dy, radius, radius, 0.0, START_EXPONENT];
+        let half = |sign: f64| [ellipse[0] + sign * dx, ellipse[1] + sign * dy, radius, radius, 0.0, START_EXPONENT];
         cut[k * PARAMETERS..(k + 1) * PARAMETERS].copy_from_slice(&half(-1.0));
         cut.extend(half(1.0));
     }

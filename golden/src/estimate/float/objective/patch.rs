@@ -20,7 +20,7 @@
 
 use super::disc::Disc;
 use super::ellipse::{Ellipse, COARSE_NODES, FINE_NODES, WIDE_NODES};
-use super::estimate::{Estimate, Objective, SearchInput, WIDE_FROM};
+use super::estimate::{MuEstimate, Objective, SearchInput, WIDE_FROM};
 use super::fit::{fit, misfit, misfit_limit, Fit, THOROUGH};
 use super::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use super::taxels::Taxels;
@@ -79,12 +79,12 @@ impl Objective for Patch {
         None
     }
 
-    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+    fn find(&self, input: &SearchInput) -> Option<MuEstimate> {
         let b = DVector::from_column_slice(input.b);
         let fit = self.fit(&b, input)?;
         let one = |evaluations: usize| {
             let force = [fit.loads[0], fit.loads[1], fit.loads[2]];
-            Estimate::of_force(force, input.mu_max, -fit.misfit, evaluations)
+            MuEstimate::of_force(force, input.mu_max, -fit.misfit, evaluations)
         };
         let limit = misfit_limit(input.b, input.noise_MPa);
         if fit.misfit <= limit {
@@ -100,7 +100,7 @@ impl Objective for Patch {
         let several = fit_ellipses(&self.taxels, input.b, &starts, limit);
         let evaluations = fit.evaluations + several.as_ref().map_or(0, |several| several.evaluations);
         match several.filter(EllipseFit::explains_stress) {
-            Some(several) => Estimate::of_force(several.force_N(), input.mu_max, -several.misfit, evaluations),
+            Some(several) => MuEstimate::of_force(several.force_N(), input.mu_max, -several.misfit, evaluations),
             None => one(evaluations),
         }
     }

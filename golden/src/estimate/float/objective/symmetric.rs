@@ -27,7 +27,7 @@
 
 use super::disc::Disc;
 use super::ellipse::WIDE_NODES;
-use super::estimate::{Estimate, Objective, SearchInput};
+use super::estimate::{MuEstimate, Objective, SearchInput};
 use super::fit::{fit, misfit_limit, Fit, THOROUGH};
 use super::symmetric_pressure::SymmetricPressure;
 use super::taxels::Taxels;
@@ -137,15 +137,15 @@ impl Objective for Symmetric {
         Some(-squares.iter().sum::<f64>()).filter(|score| score.is_finite())
     }
 
-    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+    fn find(&self, input: &SearchInput) -> Option<MuEstimate> {
         let found = search(input.family, input.mu_max, &|p| self.score(p))?;
         let [x, y] = self.peak(&input.family.eval(found.mu));
         let Some(fit) = self.refine(input, [x, y, found.mu[0], found.mu[1]]) else {
-            return Some(Estimate { found, load_N: None, sigma: None });
+            return Some(MuEstimate { found, load_N: None, sigma: None });
         };
         let load = fit.loads[0];
         let evaluations = found.evaluations + fit.evaluations;
-        Estimate::of_force([fit.theta[5] * load, fit.theta[6] * load, load], input.mu_max, -fit.misfit, evaluations)
+        MuEstimate::of_force([fit.theta[5] * load, fit.theta[6] * load, load], input.mu_max, -fit.misfit, evaluations)
     }
 }
 

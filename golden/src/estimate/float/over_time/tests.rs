@@ -6,6 +6,7 @@ use crate::data::generator::draws::DrawOptions;
 use crate::data::generator::presses::{Motion, Press};
 use crate::result::errors::Errors;
 use crate::spec::scene::{EstimatorKind, MeanKind, Scene};
+use std::ops::Range;
 
 const FRAMES: usize = 360;
 /// The longest mean has settled.
@@ -18,8 +19,14 @@ fn adaptive(name: &str) -> Scene {
 }
 
 fn press(scene: &Scene, motion: Motion, converter: Converter) -> Vec<Frame> {
+    presses(scene, motion, converter, 3..4).remove(0)
+}
+
+/// The presses of these numbers.
+fn presses(scene: &Scene, motion: Motion, converter: Converter, numbers: Range<u64>) -> Vec<Vec<Frame>> {
     let draw = DrawOptions { ratio: [0.4, 0.4], converter, ..DrawOptions::default() };
-    Press { frames: FRAMES, draw, ..Press::new(motion) }.frames(scene, 3).unwrap()
+    let press = Press { frames: FRAMES, draw, ..Press::new(motion) };
+    numbers.map(|number| press.frames(scene, number).unwrap()).collect()
 }
 
 /// Noise of 1 % of the peak, gains that differ by 1 %, codes of 10 bits.
@@ -75,6 +82,24 @@ fn the_pressure_of_a_contact_that_stays_is_remembered() {
             let held = result.extra.template.unwrap().held;
             assert!((0.0..64.0).contains(&lag) && (1..=127).contains(&mean) && (!held || mean > 100), "{motion:?} {k}");
         }
+    }
+}
+
+/// Of contacts that slide or roll the shear has less of the noise than in the window alone; one whose load grows is followed.
+#[test]
+fn the_ratio_of_a_contact_that_moves_is_that_of_longer_means() {
+    let scene = adaptive("sensor-1-noisy");
+    let golden = Golden::with(&scene, EstimatorKind::Network).unwrap();
+    let mut windows = scene.clone();
+    windows.input.template = false;
+    let windows = Golden::with(&windows, EstimatorKind::Network).unwrap();
+    for (motion, most) in [(Motion::Slide, 0.85), (Motion::Roll, 0.85), (Motion::Ramp, 1.1)] {
+        let presses = presses(&scene, motion, noisy(), 1..5);
+        let error = |golden: &Golden| -> f64 {
+            presses.iter().map(|frames| figures(frames, &results(golden, frames), SETTLED)[0]).sum()
+        };
+        let (own, alone) = (error(&golden), error(&windows));
+        assert!(own < most * alone, "{motion:?}: e_t {}, windows alone {}", own / 4.0, alone / 4.0);
     }
 }
 

@@ -175,12 +175,12 @@ pub struct TensorType {
     pub elem_type: i32,
     /// Its axes.
     #[prost(message, optional, tag = "2")]
-    pub shape: Option<Shape>,
+    pub shape: Option<TensorShape>,
 }
 
 /// The axes of a tensor.
 #[derive(Clone, PartialEq, Message)]
-pub struct Shape {
+pub struct TensorShape {
     /// Each with its length.
     #[prost(message, repeated, tag = "1")]
     pub dim: Vec<Dimension>,

@@ -211,13 +211,13 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
     let mut random = fastrand::Rng::with_seed(11);
     let cases = model.cases().len() as u64;
     let parts = most_parts(model);
-    let mut which = 0;
+    let mut case_index = 0;
     let mut threshold = 0;
     let inputs = |cycle: usize| {
         // 40 cycles of a frame begin it and store the subarrays, the rest request beats.
         let at = cycle % 300;
         if at == 0 {
-            which = random.u64(..cases);
+            case_index = random.u64(..cases);
             threshold = random.u64(..1 << 32) >> random.u8(..32);
         }
         let offer = (40..280).contains(&at) && random.u8(..4) > 0;
@@ -227,7 +227,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
         let quad: Vec<i64> = (0..4).map(value).collect();
         vec![
             (cycle < 2 || (at == 290 && random.bool())).into(),
-            which.into(),
+            case_index.into(),
             (at == 20).into(),
             (21..21 + parts).contains(&at).into(),
             (at.saturating_sub(21) as u64 % parts as u64).into(),

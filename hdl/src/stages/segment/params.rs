@@ -6,7 +6,7 @@ use crate::primitives::count_bits;
 
 /// Sizes of the circuit.
 #[derive(Clone, Debug)]
-pub(super) struct Shape {
+pub(super) struct SegmentParams {
     pub(super) rows: usize,
     pub(super) cols: usize,
     /// Rows and columns of quads.
@@ -27,7 +27,7 @@ pub(super) struct Shape {
     pub(super) taps: [Vec<(u64, u64)>; 2],
 }
 
-impl Shape {
+impl SegmentParams {
     /// Of a segmentation whose quads have lanes of `lane` bits, words from bit `low` on.
     pub(super) fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
         let (sensor, quads) = (segmentation.sensor, segmentation.quads());
@@ -44,7 +44,7 @@ impl Shape {
             };
             places.iter().enumerate().flat_map(of_place).collect::<Vec<_>>()
         };
-        Shape {
+        SegmentParams {
             rows: sensor.rows,
             cols: sensor.cols,
             quads: [quads.quad_rows(), quads.quad_cols()],
