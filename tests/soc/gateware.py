@@ -124,6 +124,30 @@ def verilate(module, pins, folder, name, driver, optimisation):
     return work / f"V{name}"
 
 
+def changing_once(text):
+    """Verilog in which `always @(*)` changes what it assigns once each time that it runs.
+
+    LiteX assigns a default first. Two blocks that assign `valid` and `ready` to each other would so wake each other for ever.
+    """
+    names = set()
+
+    def block(found):
+        assigned = {}
+
+        def to_next(line):
+            assigned.update(dict.fromkeys(re.findall(r"(?<!\w)[A-Za-z_]\w*", line[2])))
+            return line[1] + re.sub(r"(?<!\w)([A-Za-z_]\w*)", r"next_\1", line[2]) + " = "
+
+        body = re.sub(r"^(\s+)([\w{}, \[\]:]+) <= ", to_next, found[1], flags=re.MULTILINE)
+        names.update(assigned)
+        return "always @(*) begin\n" + body + "".join(f"    {name} <= next_{name};\n" for name in assigned) + "end\n"
+
+    text = re.sub(r"^always @\(\*\) begin\n(.*?)^end\n", block, text, flags=re.MULTILINE | re.DOTALL)
+    widths = {found[2]: found[1] for found in re.finditer(r"^\s*(?:output )?reg\s+((?:signed)?\s*(?:\[[^\]]*\])?)\s*(\w+)", text, flags=re.MULTILINE)}
+    declared = "".join(f"reg {widths[name]} next_{name};\n" for name in sorted(names))
+    return text.replace(");\n", f");\n{declared}", 1)
+
+
 def write_verilog(module, pins, folder, name):
     """Writes `module` with these pins as `name` into a folder, for an event-driven simulator; all Verilog files of the design."""
     text = as_verilog(module, pins, name)
@@ -132,6 +156,7 @@ def write_verilog(module, pins, folder, name):
     assigned = set(re.findall(r"^\s+(\w+)\S* <= ", text, flags=re.MULTILINE))
     first = lambda declared: f"{declared[1]};" if declared[2] in assigned else declared[0]
     text = re.sub(r"^(reg [^=;]*?(\w+)) = [^;]*;", first, text, flags=re.MULTILINE)
+    text = changing_once(text)
     path = folder / f"{name}.v"
     path.write_text(text)
     return [path, *engine_sources(module)]

@@ -458,7 +458,6 @@ def test_short_resultants_are_refused():
 
 
 # Under Icarus; test_network.py has the same under Verilator, with LiteEth before it.
-@NIGHTLY
 def test_a_core_on_the_network(monkeypatch):
     """A core between packets, under Icarus; packets so short that a frame has several."""
     for module in ("packets", "udp"):
