@@ -143,7 +143,8 @@ def changing_once(text):
         return "always @(*) begin\n" + body + "".join(f"    {name} <= next_{name};\n" for name in assigned) + "end\n"
 
     text = re.sub(r"^always @\(\*\) begin\n(.*?)^end\n", block, text, flags=re.MULTILINE | re.DOTALL)
-    widths = {found[2]: found[1] for found in re.finditer(r"^\s*(?:output )?reg\s+((?:signed)?\s*(?:\[[^\]]*\])?)\s*(\w+)", text, flags=re.MULTILINE)}
+    register = r"^\s*(?:output )?reg\s+((?:signed)?\s*(?:\[[^\]]*\])?)\s*(\w+)"
+    widths = {name: width for width, name in re.findall(register, text, flags=re.MULTILINE)}
     declared = "".join(f"reg {widths[name]} next_{name};\n" for name in sorted(names))
     return text.replace(");\n", f");\n{declared}", 1)
 

@@ -648,6 +648,13 @@ const ARRAY_PLACE: &str = "{array}";
 const LEAST_LINES: usize = 4;
 
 impl Scene {
+    /// The scene after a change.
+    pub(crate) fn changed(&self, change: impl FnOnce(&mut Scene)) -> Scene {
+        let mut scene = self.clone();
+        change(&mut scene);
+        scene
+    }
+
     /// The scene of array `array` of those that an engine serves, alone with its own files and limits; the same scene where there
     /// is one.
     pub fn of_array(&self, array: usize) -> Scene {

@@ -21,85 +21,65 @@ use super::template::shares;
 use crate::result::reconstruct::{ForceChange, FoundContact, Reconstruction};
 use crate::spec::scene::Scene;
 
-/// Ratio of shear to normal force of a contact.
-struct Ratio {
-    mu: [f64; 2],
-    /// Variance of each component.
-    variance: [f64; 2],
-    normal_N: f64,
-    centre_mm: Option<[f64; 2]>,
+/// The contacts of a result; `None` without any, and where no standard deviation of μ is known.
+pub(super) fn contacts(result: &Reconstruction) -> Option<Vec<FoundContact>> {
+    let contacts = result.all_contacts();
+    (!contacts.is_empty() && contacts.iter().all(|contact| contact.mu_sigma.is_some())).then_some(contacts)
 }
 
-/// The changes of the contacts of `window` with the ratios of the contacts of `longer` that are nearest; `None` where no standard
-/// deviations are known or nothing presses.
+/// The changes of the contacts of `window` with the ratios of the contacts of `longer` that are nearest; `None` where either has none of
+/// which the standard deviations are known, or nothing presses.
 pub(super) fn changes(scene: &Scene, window: &Reconstruction, longer: &Reconstruction) -> Option<Vec<ForceChange>> {
-    let (contacts, others) = (ratios(window)?, ratios(longer)?);
-    let change = |(contact, shares): (&Ratio, Vec<f64>)| {
-        let nearest = others.iter().min_by(|a, b| contact.away_mm(a).total_cmp(&contact.away_mm(b)));
-        let (force_N, variance_N2) = nearest.map_or_else(Default::default, |l| contact.change(l, scene.search.mu_max));
+    let (of_window, of_longer) = (contacts(window)?, contacts(longer)?);
+    let change = |(contact, shares): (&FoundContact, Vec<f64>)| {
+        let away = |other: &FoundContact| away_mm(contact, other);
+        let nearest = of_longer.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+        let (force_N, variance_N2) = nearest.map_or_else(Default::default, |l| change(contact, l, scene.search.mu_max));
         ForceChange { force_N, variance_N2, shares }
     };
-    Some(contacts.iter().zip(shares(&scene.sensor, window)?).map(change).collect())
+    Some(of_window.iter().zip(shares(&scene.sensor, window)?).map(change).collect())
 }
 
-/// The ratios of the contacts of a result, or of the array as one subarray.
-fn ratios(result: &Reconstruction) -> Option<Vec<Ratio>> {
-    match (result.contacts(), result.subarrays.as_slice()) {
-        (Some(contacts), _) => contacts.iter().map(Ratio::of).collect(),
-        (None, [whole]) => {
-            let variance = whole.mu_sigma?.map(|sigma| sigma * sigma);
-            Some(vec![Ratio { mu: whole.mu, variance, normal_N: result.resultant_N[2], centre_mm: None }])
-        }
-        _ => None,
+/// Distance of two contacts in mm; 0 where no place is known.
+fn away_mm(a: &FoundContact, b: &FoundContact) -> f64 {
+    match (a.centre_mm, b.centre_mm) {
+        (Some([x, y]), Some([u, v])) => (x - u).hypot(y - v),
+        _ => 0.0,
     }
 }
 
-impl Ratio {
-    fn of(contact: &FoundContact) -> Option<Ratio> {
-        let variance = contact.mu_sigma?.map(|sigma| sigma * sigma);
-        Some(Ratio { mu: contact.mu, variance, normal_N: contact.force_N[2], centre_mm: contact.centre_mm })
+/// The change of the force of a contact in N, and of its variance in N², with the ratio of a longer mean; none of one that does not press.
+fn change(window: &FoundContact, longer: &FoundContact, mu_max: f64) -> ([f64; 3], [f64; 3]) {
+    let (normal_N, mut force_N, mut variance_N2) = (window.force_N[2], [0.0; 3], [0.0; 3]);
+    let (Some(sigma), Some(longer_sigma), true) = (window.mu_sigma, longer.mu_sigma, normal_N > 0.0) else {
+        return (force_N, variance_N2);
+    };
+    let apart = [0, 1].map(|axis| longer.mu[axis] - window.mu[axis]);
+    let gained = [0, 1].map(|axis| (sigma[axis].powi(2) - longer_sigma[axis].powi(2)).max(0.0));
+    let loaded = mu_max * (longer.force_N[2] / normal_N - 1.0);
+    let drift = (0.5 * (apart[0].powi(2) + apart[1].powi(2) - gained[0] - gained[1])).max(0.0) + loaded * loaded;
+    for axis in (0..2).filter(|axis| gained[*axis] > 0.0) {
+        let share = gained[axis] / (gained[axis] + drift);
+        force_N[axis] = share * apart[axis] * normal_N;
+        variance_N2[axis] = -share * gained[axis] * normal_N.powi(2);
     }
-
-    /// Distance from another contact in mm; 0 where no place is known.
-    fn away_mm(&self, other: &Ratio) -> f64 {
-        match (self.centre_mm, other.centre_mm) {
-            (Some([x, y]), Some([u, v])) => (x - u).hypot(y - v),
-            _ => 0.0,
-        }
-    }
-
-    /// The change of the force in N, and of its variance in N², with the ratio of a longer mean; none of a contact that does not press.
-    fn change(&self, longer: &Ratio, mu_max: f64) -> ([f64; 3], [f64; 3]) {
-        if self.normal_N <= 0.0 {
-            return Default::default();
-        }
-        let apart = [0, 1].map(|axis| longer.mu[axis] - self.mu[axis]);
-        let gained = [0, 1].map(|axis| (self.variance[axis] - longer.variance[axis]).max(0.0));
-        let loaded = mu_max * (longer.normal_N / self.normal_N - 1.0);
-        let drift = (0.5 * (apart[0].powi(2) + apart[1].powi(2) - gained[0] - gained[1])).max(0.0) + loaded * loaded;
-        let (mut force_N, mut variance_N2) = ([0.0; 3], [0.0; 3]);
-        for axis in (0..2).filter(|axis| gained[*axis] > 0.0) {
-            let share = gained[axis] / (gained[axis] + drift);
-            force_N[axis] = share * apart[axis] * self.normal_N;
-            variance_N2[axis] = -share * gained[axis] * self.normal_N.powi(2);
-        }
-        (force_N, variance_N2)
-    }
+    (force_N, variance_N2)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn ratio(mu: [f64; 2], sigma: f64, normal_N: f64) -> Ratio {
-        Ratio { mu, variance: [sigma * sigma; 2], normal_N, centre_mm: None }
+    fn ratio(mu: [f64; 2], sigma: f64, normal_N: f64) -> FoundContact {
+        let force_N = [mu[0] * normal_N, mu[1] * normal_N, normal_N];
+        FoundContact { mu, mu_sigma: Some([sigma; 2]), force_N, ..FoundContact::default() }
     }
 
     /// By hand, of 2 N.
     #[test]
     fn a_longer_mean_counts_as_far_as_it_agrees() {
         let window = ratio([0.3, 0.0], 0.05, 2.0);
-        let change = |longer: &Ratio| window.change(longer, 0.6);
+        let change = |longer: &FoundContact| super::change(&window, longer, 0.6);
         // Within the noise: μ and σ are those of the longer mean.
         let (force_N, variance_N2) = change(&ratio([0.32, -0.01], 0.02, 2.0));
         assert!((force_N[0] - 0.04).abs() < 1e-12 && (force_N[1] + 0.02).abs() < 1e-12 && force_N[2] == 0.0);
@@ -114,6 +94,6 @@ mod tests {
         // No less noise, no change.
         assert_eq!(change(&ratio([0.32, 0.0], 0.05, 2.0)), ([0.0; 3], [0.0; 3]));
         let lifted = ratio([0.0; 2], 0.05, 0.0);
-        assert_eq!(lifted.change(&ratio([0.3, 0.0], 0.02, 0.0), 0.6), ([0.0; 3], [0.0; 3]));
+        assert_eq!(super::change(&lifted, &ratio([0.3, 0.0], 0.02, 0.0), 0.6), ([0.0; 3], [0.0; 3]));
     }
 }

@@ -71,6 +71,16 @@ struct Explained {
     sigma: f64,
 }
 
+/// The mean of a window of `means`; `frame` has what does not depend on it.
+fn averaged(means: &Means, window: &Window, frame: &Frame) -> Averaged {
+    Averaged {
+        mean: Frame { stress_MPa: means.mean(window), ..frame.clone() },
+        variance: window.variance,
+        frames_held: Some(window.frames_held()),
+        lag_frames: Some(window.age),
+    }
+}
+
 impl Golden {
     /// Reconstructs frames of one result, after those of which `past` is; it is then that after these frames. Of a mean that slides
     /// they are any number, of which the last one has the result.
@@ -100,13 +110,7 @@ impl Golden {
             return self.of_mean(of_window, memory, newest, &window);
         };
         let longest = means.longest();
-        let averaged = |own: &Window| Averaged {
-            mean: Frame { stress_MPa: means.mean(own), ..window.mean.clone() },
-            variance: own.variance,
-            frames_held: Some(own.frames_held()),
-            lag_frames: Some(own.age),
-        };
-        let held = averaged(&longest);
+        let held = averaged(means, &longest, &window.mean);
         let mut result = self.of_mean(of_longest, memory, newest, &held)?;
         let explained = self.explain(influences, means, sigma_MPa, (&held.mean, &result));
         let before = residual.unwrap_or(1.0);
@@ -125,16 +129,19 @@ impl Golden {
             }
             None if window.variance == held.variance => (),
             None => {
-                let mut own = self.of_mean(of_window, memory, newest, &window)?;
-                let long = means.singles().into_iter().nth(1).filter(|long| long.variance < window.variance);
-                let long = long.map(|long| self.of_mean(of_long, memory, newest, &averaged(&long))).transpose()?;
-                // From short to long: what of μ has changed shows against the noise of the mean before.
-                for longer in long.iter().chain([&result]) {
-                    if let Some(changes) = longer_ratio::changes(self.scene(), &own, longer) {
-                        own.change(self.scene(), &window.mean, &changes);
+                let longest = result;
+                result = self.of_mean(of_window, memory, newest, &window)?;
+                if longer_ratio::contacts(&result).is_some() {
+                    let long = means.singles().into_iter().nth(1).filter(|long| long.variance < window.variance);
+                    let long = long.map(|long| averaged(means, &long, &window.mean));
+                    let long = long.map(|long| self.of_mean(of_long, memory, newest, &long)).transpose()?;
+                    // From short to long: what of μ has changed shows against the noise of the mean before.
+                    for longer in long.into_iter().chain([longest]) {
+                        if let Some(changes) = longer_ratio::changes(self.scene(), &result, &longer) {
+                            result.change(self.scene(), &window.mean, &changes);
+                        }
                     }
                 }
-                result = own;
             }
         }
         result.extra.template = template;

@@ -71,13 +71,6 @@ fn set(has: bool, own: String, added: &str) -> String {
     }
 }
 
-/// The scene after a change.
-fn changed(scene: &Scene, change: impl FnOnce(&mut Scene)) -> Scene {
-    let mut scene = scene.clone();
-    change(&mut scene);
-    scene
-}
-
 impl List<'_> {
     /// Adds a feature; where the scene does not have it, its plan.
     fn add_plan(
@@ -94,7 +87,7 @@ impl List<'_> {
     /// Adds a feature that a scene without it has after a change.
     fn add(&mut self, name: &'static str, has: bool, setting: String, change: impl FnOnce(&mut Scene)) {
         let scene = self.scene;
-        self.add_plan(name, has, setting, || planned(&changed(scene, change)));
+        self.add_plan(name, has, setting, || planned(&scene.changed(change)));
     }
 
     /// Adds a feature of the scene that is not added to others.
@@ -105,7 +98,7 @@ impl List<'_> {
     /// The plan after a change without the feature added last, where the scene has it.
     fn without(&mut self, change: impl FnOnce(&mut Scene)) {
         if let Some(feature) = self.all.last_mut().filter(|feature| feature.with_feature.is_none()) {
-            feature.without_feature = planned(&changed(self.scene, change)).ok();
+            feature.without_feature = planned(&self.scene.changed(change)).ok();
         }
     }
 
@@ -121,7 +114,7 @@ impl List<'_> {
             self.add_own("scan", format!("{} {} on one bus", scan.converters, scan.converter.name));
         }
         let check = |s: &mut Scene| s.hardware.code_check = CodeCheck::On;
-        if changed(self.scene, check).checks_codes() && self.plan.board.engine == EngineKind::Parallel {
+        if self.scene.changed(check).checks_codes() && self.plan.board.engine == EngineKind::Parallel {
             let checks = self.scene.checks_codes();
             self.add("code check", checks, "plateaus, repeated rows and columns".into(), check);
             self.without(|s| s.hardware.code_check = CodeCheck::Off);
@@ -138,13 +131,13 @@ impl List<'_> {
         let table = input.calibration.is_some() || written;
         self.add_plan("tare frame", table || input.tare.is_some(), "a zero per taxel".into(), || {
             let tared = |s: &mut Scene| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
-            scaled(&changed(scene, tared), false)
+            scaled(&scene.changed(tared), false)
         });
         let setting = format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel");
         self.add_plan("calibration table", table, setting, || {
             let tabled =
                 |s: &mut Scene| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
-            scaled(&changed(scene, tabled), true)
+            scaled(&scene.changed(tabled), true)
         });
         let writes = |s: &mut Scene| {
             (s.hardware.tables, s.input.full_scale_MPa) = (TableStorage::Writable, Some(full_scale));
@@ -191,7 +184,7 @@ impl List<'_> {
         self.add("averaging", input.longest_average() > 0, format!("{frames} frames"), |s| s.input.average = power);
         self.add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), slide);
         self.without(|s| s.input.mean = MeanKind::Block);
-        let longest = changed(self.scene, adaptive).input.longest_average();
+        let longest = self.scene.changed(adaptive).input.longest_average();
         self.add("adaptive mean", adapts, format!("the longest of {} frames", most_frames(longest)), adaptive);
         self.without(slide);
     }

@@ -60,14 +60,8 @@ fn suggestion((change, scene): Change) -> Option<FitSuggestion> {
     })
 }
 
-fn changed(scene: &Scene, change: impl FnOnce(&mut Scene)) -> Scene {
-    let mut scene = scene.clone();
-    change(&mut scene);
-    scene
-}
-
 fn lanes(scene: &Scene) -> Option<Change> {
-    scene.fixed.lanes.map(|_| ("fixed.lanes left out".to_string(), changed(scene, |s| s.fixed.lanes = None)))
+    scene.fixed.lanes.map(|_| ("fixed.lanes left out".to_string(), scene.changed(|s| s.fixed.lanes = None)))
 }
 
 /// The list of cases without one of them, the coarser ones removed first.
@@ -80,7 +74,7 @@ fn fewer_cases(scene: &Scene) -> Vec<Change> {
         listed[number] = false;
         let left: Vec<String> = (0..4).filter(|&number| listed[number]).map(|number| number.to_string()).collect();
         let text = format!("partition.cases = [{}]", left.join(", "));
-        (text, changed(scene, |s| s.partition.listed = Some(listed)))
+        (text, scene.changed(|s| s.partition.listed = Some(listed)))
     };
     (1..4).rev().filter(|&number| listed[number]).map(without).collect()
 }
@@ -104,7 +98,7 @@ fn partitions(scene: &Scene) -> Vec<Change> {
             Some(number) => format!("partition.case = {number}"),
             None => format!("partition.rows = {}, partition.cols = {}", grid.rows, grid.cols),
         };
-        (text, changed(scene, |s| s.partition.case = case))
+        (text, scene.changed(|s| s.partition.case = case))
     };
     grids.into_iter().map(change).collect()
 }
@@ -120,7 +114,7 @@ fn degrees(plan: &Plan) -> Vec<Change> {
     let lower = radii.map(largest).into_iter().chain([0.0]);
     lower
         .filter(|&mu_max| mu_max < scene.search.mu_max)
-        .map(|mu_max| (format!("search.mu_max = {mu_max}"), changed(scene, |s| s.search.mu_max = mu_max)))
+        .map(|mu_max| (format!("search.mu_max = {mu_max}"), scene.changed(|s| s.search.mu_max = mu_max)))
         .collect()
 }
 
@@ -130,5 +124,5 @@ const MIN_PRUNE_BITS: u32 = 8;
 fn pruned(scene: &Scene) -> impl Iterator<Item = Change> + '_ {
     (MIN_PRUNE_BITS..scene.fixed.prune_bits)
         .rev()
-        .map(|bits| (format!("fixed.prune_bits = {bits}"), changed(scene, |s| s.fixed.prune_bits = bits)))
+        .map(|bits| (format!("fixed.prune_bits = {bits}"), scene.changed(|s| s.fixed.prune_bits = bits)))
 }
