@@ -103,9 +103,9 @@ impl Means {
         self.single(0)
     }
 
-    /// Every mean, the longest first.
-    pub fn singles(&self) -> Vec<Window> {
-        (0..self.means.len()).rev().map(|k| self.single(k)).collect()
+    /// The second shortest mean, of one alone that.
+    pub fn second_shortest(&self) -> Window {
+        self.single(1.min(self.means.len() - 1))
     }
 
     /// The windows that count, as [`MeanWindow::all`] has them, each with the limit of its χ² with `live` taxels.
@@ -115,6 +115,12 @@ impl Means {
             .iter()
             .filter(counts)
             .map(move |window| (Window::of(&self.averages, *window, &self.noise), window.limit(&self.averages, live)))
+    }
+
+    /// The window between two others, with `share`, 0 to 1, of the second.
+    pub fn between(&self, first: &Window, second: &Window, share: f64) -> Window {
+        let weights = std::iter::zip(&first.weights, &second.weights).map(|(a, b)| a + share * (b - a));
+        Window::new(&self.noise, weights.collect())
     }
 
     fn single(&self, mean: usize) -> Window {

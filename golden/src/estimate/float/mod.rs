@@ -40,8 +40,8 @@ mod estimator;
 mod golden;
 #[cfg(test)]
 mod golden_tests;
-mod longer_ratio;
 mod over_time;
+mod ratio_mean;
 mod run;
 mod template;
 mod unipolar;

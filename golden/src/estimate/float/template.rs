@@ -76,10 +76,8 @@ impl Influences {
 }
 
 impl Template {
-    /// That of the contacts of `result`, where one force vector per taxel is known; `counts` says which taxels do. `None` without a
-    /// contact that presses, and where the readings do not tell the forces apart.
-    pub(super) fn new(influences: &Influences, result: &Reconstruction, counts: &[bool]) -> Option<Template> {
-        let shares = shares(&influences.sensor, result)?;
+    /// That of contacts with these `shares`; `counts` says which taxels do. `None` where the readings do not tell the forces apart.
+    pub(super) fn new(influences: &Influences, shares: Vec<Vec<f64>>, counts: &[bool]) -> Option<Template> {
         let columns: Vec<Vec<f64>> = shares.iter().flat_map(|own| influences.columns(own, counts)).collect();
         let n = columns.len();
         let normal = Mat::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]));

@@ -87,7 +87,7 @@ fn the_pressure_of_a_contact_that_stays_is_remembered() {
 
 /// Of contacts that slide or roll the shear has less of the noise than in the window alone; one whose load grows is followed.
 #[test]
-fn the_ratio_of_a_contact_that_moves_is_that_of_longer_means() {
+fn the_ratio_of_a_contact_that_moves_is_that_of_many_frames() {
     let scene = adaptive("sensor-1-noisy");
     let golden = Golden::with(&scene, EstimatorKind::Network).unwrap();
     let mut windows = scene.clone();
