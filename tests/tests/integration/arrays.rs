@@ -9,6 +9,7 @@ use dermis_cosim::{run, DeviceUnderTest, Vector};
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::plan::interval::{frame_interval, longest_wait, longest_wait_with_image};
 use dermis_golden::fixed::plan::resources::{Holds, Memory};
+use dermis_golden::fixed::stages::load::{beats, Outcome, WORD_BYTES};
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::spec::scene::{MeanKind, RunningZero, Scene, Zero};
 use dermis_hdl::generate_changed;
@@ -18,6 +19,8 @@ use tempfile::TempDir;
 
 const ARRAYS: usize = 4;
 const TAXELS: usize = 12;
+/// Word of an image of tables that holds the noise floor.
+const NOISE_FLOOR_WORD: usize = 2;
 /// Frames of a run.
 const FRAMES: usize = 100;
 
@@ -187,6 +190,32 @@ fn an_image_among_frames_delays_them_by_no_more_than_the_bound() {
         };
         let most = (0..ARRAYS).map(at).max().unwrap();
         is_near(what, model, most, longest_wait_with_image(model).unwrap());
+    }
+}
+
+/// A damaged image leaves its noise floor in the hardware, while every stress of its array is 0. The bit above the largest floor is
+/// not a sign: above a negative floor a stress of 0 is, and its frame would be searched, which the model does not do.
+#[test]
+fn a_damaged_noise_floor_starts_no_search() {
+    let (_folder, scene) = scene(SCENES[1].1);
+    let hardware = hardware(&scene);
+    let [mut spoiled, other] = [1, 2].map(|array| hardware.model.of_array(array).unwrap());
+    let mut image = Vector { array: 1, ..Vector::of_image(&spoiled) };
+    let bit = 8 * NOISE_FLOOR_WORD * WORD_BYTES + spoiled.formats().input_bits as usize - 1;
+    let mut bytes = spoiled.image();
+    bytes[bit / 8] ^= 1 << (bit % 8);
+    image.codes = beats(&bytes, spoiled.formats().code_bits);
+    assert_eq!(spoiled.load(&bytes), Outcome::Broken);
+    let codes = || (0..TAXELS as i32).map(|taxel| 9000 / (1 + taxel)).collect::<Vec<_>>();
+    let frame = |model: &Model, array: usize| {
+        let expected = model.run(&codes());
+        Vector { array, ..Vector::new(model, format!("a frame of array {array}"), codes(), expected) }
+    };
+    let vectors = [image, frame(&spoiled, 1), frame(&other, 2)];
+    let [_, unsearched, searched] = vectors.each_ref().map(|vector| vector.expected.cycles.total);
+    assert!(unsearched < searched && searched == Cycles::longest(&hardware.model).total);
+    for stimulus in [Stimulus::FullSpeed, Stimulus::BackToBack] {
+        assert_equal(&compare(&hardware, Simulator::Verilator, &vectors, stimulus), stimulus);
     }
 }
 

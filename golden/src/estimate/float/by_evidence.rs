@@ -11,9 +11,8 @@ use crate::data::input::Input;
 use crate::estimate::evidence::{Evidence, LastFit};
 use crate::estimate::learned::Learned;
 use crate::physics::matrices::{check_size, MatricesError};
-use crate::result::checks::{largest_spread, relative_spread};
 use crate::result::flags::Flag;
-use crate::result::reconstruct::{ContactEstimate, Reconstruction};
+use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
 
 /// Most taxels of an array: with a press on all of them a frame takes half a minute and a gigabyte.
@@ -62,16 +61,15 @@ impl Estimator for ByEvidence {
         let mut result = input.finish(CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
-        result.checks.shear_spread = shear_spread(&estimate.contacts);
         result.checks.baseline_MPa = (!estimate.failed).then_some(estimate.baseline_MPa);
         result.checks.residual_outlier = estimate.outlier;
         result.checks.residual_correlation = estimate.residual_correlation;
         result.flags.extend(estimate.failed.then_some(Flag::EstimateFailed));
         result.flags.extend((!estimate.suspects.is_empty()).then_some(Flag::TaxelSuspect));
         result.extra.suspects = estimate.suspects;
-        result.checks.missing_load =
-            (!input.frame.missing.is_empty()).then(|| normal_spread(&estimate.contacts)).flatten();
         result.extra.contacts = Some(estimate.contacts);
+        result.checks.shear_spread = result.shear_spread();
+        result.checks.missing_load = (!input.frame.missing.is_empty()).then(|| normal_spread(&result)).flatten();
         result
     }
 
@@ -81,18 +79,8 @@ impl Estimator for ByEvidence {
 }
 
 /// Twice the standard deviation of the normal force of all contacts over that force; `None` without one.
-fn normal_spread(contacts: &[ContactEstimate]) -> Option<f64> {
-    let normal: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
-    let variance: f64 = contacts.iter().map(|contact| contact.sigma_N[2].powi(2)).sum();
-    (normal > 0.0).then(|| 2.0 * variance.sqrt() / normal)
-}
-
-/// Standard deviation of the shear over its size, the largest of all contacts with a share of the load. Below a
-/// hundredth of the normal force a shear counts as none, and its standard deviation is taken over that.
-fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
-    let spread = |contact: &ContactEstimate| {
-        let ([x, y, normal], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
-        (normal, Some(relative_spread([x, y], [sx, sy], normal)))
-    };
-    largest_spread(&contacts.iter().map(spread).collect::<Vec<_>>())
+fn normal_spread(result: &Reconstruction) -> Option<f64> {
+    let (contacts, [_, _, sigma_N]) = (result.contacts()?, result.sigma_N()?);
+    let normal_N: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
+    (normal_N > 0.0).then(|| 2.0 * sigma_N / normal_N)
 }

@@ -62,7 +62,7 @@ impl Reconstruction {
     }
 
     /// Standard deviation of the shear over its size, the largest of all contacts with a share of the load; `None` where none is known.
-    fn shear_spread(&self) -> Option<f64> {
+    pub(crate) fn shear_spread(&self) -> Option<f64> {
         let spread = |[x, y, normal]: [f64; 3], sigma: Option<[f64; 2]>| {
             (normal, sigma.map(|sigma| relative_spread([x, y], sigma, normal)))
         };
