@@ -86,6 +86,15 @@ fn a_small_scene_behind_an_spi() {
     makes_a_bitstream_without_regression("tiny-spi");
 }
 
+/// A stand-in for Yosys, which takes most of the time: a netlist without cells or ports.
+const EMPTY: &str = r#"#!/bin/sh
+[ "$1" = --version ] && echo 'Yosys 0.0' && exit
+for last; do :; done
+for name in ports.json netlist.json; do
+  case $last in *" $name"*) echo '{"modules": {"board": {"ports": {}}}}' > $name;; esac
+done
+"#;
+
 /// A stand-in for nextpnr that reaches half of the required clock.
 const SLOW: &str = r#"#!/bin/sh
 [ "$1" = --version ] && echo 'nextpnr 0.0' && exit
@@ -101,6 +110,7 @@ fn a_missed_clock_fails_and_leaves_neither_bitstream_nor_baseline() {
     let folder = tempfile::tempdir().unwrap();
     let (tools, baselines) = (folder.path().join("tools"), folder.path().join("constraints"));
     [&tools, &baselines].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
+    fake::program(&tools, "yosys", EMPTY);
     fake::program(&tools, "nextpnr-ice40", SLOW);
     let path = format!("{}:{}", tools.display(), std::env::var("PATH").unwrap());
     let output = bitstream("tiny", folder.path()).arg("--update-baselines").env("PATH", path).output().unwrap();
