@@ -27,7 +27,7 @@ const NEAR: f64 = 0.15;
 const NEAR_ROUTED: f64 = 0.1;
 
 /// Runs Yosys to the end of a `synth_ecp5` stage and returns the counts of cells by type.
-fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
+fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize + use<> {
     tools::cells(generated, &format!("synth_ecp5 -run begin:{until}"))
 }
 
