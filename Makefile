@@ -211,7 +211,7 @@ gateware: program tools ## put SCENE behind the Ethernet of BOARD, by default co
 	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/soc/requirements.txt
 	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check --no-deps ./python/litex
 	$(DERMIS) build $(SCENE) --bus wishbone --target-board python/litex/boards/$(NETWORK).toml --out $(OUT)/core
-	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(BUILD)/gateware-tools/bin/python -m dermis_litex.gateware $(NETWORK) $(OUT)/core $(OUT) --run
+	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(DERMIS)) $(BUILD)/gateware-tools/bin/python -m dermis_litex.gateware $(NETWORK) $(OUT)/core $(OUT) --run
 
 report: program ## write build/report/report.html and paper.html; QUICK=1 takes two minutes
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)

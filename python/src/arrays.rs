@@ -21,10 +21,10 @@ pub fn numbers<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonl
     if numpy.getattr("ma")?.call_method1("is_masked", (value,))?.is_truthy()? {
         return Err(input(format!("{name} has masked values, wanted numbers")));
     }
-    if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
-        if array.is_c_contiguous() {
-            return borrowed(array);
-        }
+    if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
+        && array.is_c_contiguous()
+    {
+        return borrowed(array);
     }
     let array = numpy.call_method1("asarray", (value,)).map_err(|error| input(format!("{name}: {error}")))?;
     let dtype = array.getattr("dtype")?;

@@ -45,7 +45,7 @@ pub fn yosys(folder: &Path, script: &str) -> Result<(), String> {
 ///
 /// # Panics
 /// If Yosys is not installed or refuses the design.
-pub fn cells(generated: &Generated, synthesis: &str) -> impl Fn(&str) -> usize {
+pub fn cells(generated: &Generated, synthesis: &str) -> impl Fn(&str) -> usize + use<> {
     let folder = folder_of(generated);
     let top = &generated.top;
     let script = format!("read_verilog {top}.v; {synthesis} -top {top}; tee -o stat.json stat -json");

@@ -44,10 +44,8 @@ impl<E: Engine + ?Sized> CheckedEngine<E> {
     /// As [`Engine::reconstruct`].
     pub fn result(&self, frames: &[Frame], cross_check: bool) -> Result<Reconstruction, EngineError> {
         let mut result = self.engine.reconstruct(frames)?;
-        if cross_check {
-            if let Some(check) = self.check.get_or_init(|| CrossCheck::of(&*self.engine)) {
-                check.check(frames, result.resultant_N, &mut result.diagnostics());
-            }
+        if cross_check && let Some(check) = self.check.get_or_init(|| CrossCheck::of(&*self.engine)) {
+            check.check(frames, result.resultant_N, &mut result.diagnostics());
         }
         Ok(result)
     }

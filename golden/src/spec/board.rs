@@ -39,7 +39,7 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 pub use error::BoardError;
-pub use family::{Device, Family};
+pub use family::{Device, Family, Tries};
 use files::Folder;
 pub use power::Power;
 use reader::Reader;
@@ -238,6 +238,11 @@ impl Board {
                 Err(self.invalid(field, reason))
             }
         }
+    }
+
+    /// How place and route is tried.
+    pub fn tries(&self) -> Tries {
+        Tries { seeds: self.seeds, placers: self.placers.clone(), minutes: self.place_minutes }
     }
 
     /// Energies of the device's resources; `None` for a family without them.

@@ -480,10 +480,10 @@ impl<'k> Net<'k> {
     }
 
     fn register(self, change: impl FnOnce(&mut Register)) -> Self {
-        if let Some(signal) = self.signal {
-            if let Role::Register(register) = &mut self.builder.kernel.borrow_mut().signals[signal].role {
-                change(register);
-            }
+        if let Some(signal) = self.signal
+            && let Role::Register(register) = &mut self.builder.kernel.borrow_mut().signals[signal].role
+        {
+            change(register);
         }
         self
     }

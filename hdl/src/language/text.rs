@@ -167,10 +167,10 @@ impl<'a> Text<'a> {
     fn fit(&self, node: NodeId, bits: usize, least: Binding) -> String {
         let ty = self.kernel.ty(node);
         let Some(more) = bits.checked_sub(ty.bits).filter(|more| *more > 0) else { return self.within(node, least) };
-        if let Node::Constant(limbs) = &self.kernel.nodes[node].0 {
-            if !ty.signed {
-                return number(bits, limbs);
-            }
+        if let Node::Constant(limbs) = &self.kernel.nodes[node].0
+            && !ty.signed
+        {
+            return number(bits, limbs);
         }
         let text = self.within(node, Binding::Mux);
         match ty.signed {

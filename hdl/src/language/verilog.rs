@@ -197,7 +197,7 @@ impl Printer<'_> {
             .expressions
             .names
             .iter()
-            .filter(|(&node, _)| kernel.bare(node) == node && unread(node))
+            .filter(|&(&node, _)| kernel.bare(node) == node && unread(node))
             .map(|(_, name)| name.clone());
         names(signals).chain(own).collect()
     }

@@ -1,7 +1,7 @@
 """Gateware of a board: a core behind gigabit Ethernet, without a processor.
 
 Written into a folder: `board.v`, the core's files, the pins `board.lpf`, the script of Yosys `board.ys`, and `build_board.sh`,
-which runs the tools once. With `--run` `route` runs them. Pins and devices are those of `litex-boards`.
+which runs the tools once. With `--run` `dermis place` runs them. Pins and devices are those of `litex-boards`.
 """
 
 import argparse
@@ -25,6 +25,8 @@ from dermis_litex.udp import DermisUDP
 MAC_BYTES = 6
 # Files and top module.
 NAME = "board"
+# How far the PLL's clock may be from the core's: `dermis place` refuses one that is further off.
+CLOCK_MARGIN = 1e-3
 # A word of the network comes in as many cycles of the PHY as it has bytes. The core's clock has room for twice as many: LiteEth
 # spends some cycles on the headers of each packet.
 LEAST_HZ = 2 * LiteEthPHYRGMII.rx_clk_freq * LiteEthPHYRGMII.dw / WORD_BITS
@@ -67,7 +69,7 @@ class Clocks(LiteXModule):
         self.comb += pll.reset.eq(~platform.request(board.reset_n))
         pll.register_clkin(platform.request(board.clock), board.clock_Hz)
         try:
-            pll.create_clkout(self.cd_sys, clock_Hz, margin=route.ROUNDING)
+            pll.create_clkout(self.cd_sys, clock_Hz, margin=CLOCK_MARGIN)
             pll.finalize()
         except (AssertionError, ValueError) as error:
             raise CoreError(
@@ -108,8 +110,7 @@ class Gateware(LiteXModule):
 def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force_bits=WORD_BITS):
     """Writes the gateware of board `name` with the core of `folder` into the folder `out`.
 
-    Returns what `route` needs: what the gateware is, with a part of the name of each clock's net and the MHz that it must reach,
-    and the arguments of nextpnr for device and pins.
+    Returns what `route` needs: what the gateware is, and the arguments of `dermis place` for its device and clocks.
 
     Raises `CoreError` as `Gateware` and `DermisUDP` do.
     """
@@ -125,7 +126,13 @@ def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force
     # Look-up tables that a slice's multiplexers join are placed as one: single ones come closer to their neighbours.
     platform.build(gateware, build_dir=str(out), build_name=NAME, run=False, nowidelut=True)
     family, size, speed, package = platform.toolchain.nextpnr_ecp5_parse_device(platform.device)
-    device = f"--{platform.toolchain.nextpnr_ecp5_architectures[f'{family}-{size}']}"
+    size = platform.toolchain.nextpnr_ecp5_architectures[f"{family}-{size}"]
+    # A part of the name of each clock's net, and the MHz that it must reach.
+    clocks = {
+        "core": f"pll_clkout:{manifest['clock_MHz']}",
+        "Ethernet": f"eth_clocks0_rx:{gateware.phy.rx_clk_freq / 1e6}",
+    }
+    device = ["--family", "ecp5", "--size", size, "--package", package, "--speed-grade", speed]
     sensor = manifest["sensor"]
     design = {
         "board": name,
@@ -134,12 +141,8 @@ def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force
         "array": f"{sensor['rows']}×{sensor['cols']}",
         "lanes": manifest["sizes"]["lanes"],
         "force_bits": force_bits,
-        "clocks": {
-            "core": {"net": "pll_clkout", "wanted_MHz": manifest["clock_MHz"]},
-            "Ethernet": {"net": "eth_clocks0_rx", "wanted_MHz": gateware.phy.rx_clk_freq / 1e6},
-        },
     }
-    return design, [device, "--package", package, "--speed", speed, "--lpf", f"{NAME}.lpf"]
+    return design, device + [f"--clock={name}={clock}" for name, clock in clocks.items()]
 
 
 def mac_address(text):
@@ -148,13 +151,6 @@ def mac_address(text):
     if len(data) != MAC_BYTES:
         raise argparse.ArgumentTypeError(f"{text!r}: not {MAC_BYTES} bytes, as in 10:e2:d5:00:00:01")
     return int.from_bytes(data, "big")
-
-
-def positive(text):
-    """A number above 0."""
-    if int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text}: not 1 or more")
-    return int(text)
 
 
 def main():
@@ -172,9 +168,9 @@ def main():
     parser.add_argument("--mac", type=mac_address, default=mac, help="its MAC address (%(default)s)")
     parser.add_argument("--code-bytes", type=int, choices=[2, 4], default=2, help="bytes of a code in a packet (%(default)s)")
     parser.add_argument("--force-bits", type=int, choices=[16, 32], default=32, help="bits of a force in a packet (%(default)s)")
-    parser.add_argument("--run", action="store_true", help="run Yosys, nextpnr and ecppack; write and print the figures")
-    parser.add_argument("--seeds", type=positive, default=3, help="most seeds to try until all clocks are reached (%(default)s)")
-    parser.add_argument("--minutes", type=positive, default=180, help="time limit of a tool's run (%(default)s)")
+    parser.add_argument("--run", action="store_true", help="run `dermis place`; write and print the figures")
+    parser.add_argument("--seeds", help="most seeds to try until all clocks are reached, as of `dermis place`")
+    parser.add_argument("--minutes", help="time limit of a tool's run, as of `dermis place`")
     options = parser.parse_args()
     try:
         design, arguments = write(
@@ -182,12 +178,14 @@ def main():
         )
         if not options.run:
             return
-        figures = route.route(options.out, design, arguments, options.seeds, options.minutes)
+        limits = {"--seeds": options.seeds, "--minutes": options.minutes}
+        arguments += [f"{option}={value}" for option, value in limits.items() if value is not None]
+        figures = route.route(options.out / f"{NAME}.ys", design, arguments)
     except (CoreError, route.RouteError) as error:
         sys.exit(f"error: {error}")
     print(route.table([figures]))
     if not figures["is_met"]:
-        sys.exit(f"error: missed with {options.seeds} seeds: {', '.join(route.missed(figures))}; logs in {options.out}")
+        sys.exit(f"error: missed with every seed: {', '.join(figures['missed'])}; logs in {options.out}")
 
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ impl<'a> Arrays<'a> {
 /// time show more, and take less time with evidence: dermis_stream. DERMIS_STATUS_INPUT for a sliding mean and a running zero, whose
 /// results depend on the frames before; DERMIS_STATUS_ABSENT for forces of taxels of output.forces = "resultants". After an error what
 /// the arrays hold is not defined.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_reconstruct_many(
     scene: *const dermis_scene,
     engine: *const c_char,

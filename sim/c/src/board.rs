@@ -42,7 +42,7 @@ fn failed(error: anyhow::Error) -> Error {
 /// cross_check is that of dermis_stream_new: the frames that are answered are a stream.
 ///
 /// DERMIS_STATUS_BOARD: no answer, or a board of another scene or version.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_board_open(
     scene: *const dermis_scene,
     port: *const c_char,
@@ -65,7 +65,7 @@ pub unsafe extern "C" fn dermis_board_open(
 }
 
 /// Close a board; NULL is allowed. Results that it gave stay valid.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_board_free(board: *mut dermis_board) {
     unsafe { free(board) }
 }
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn dermis_board_free(board: *mut dermis_board) {
 /// Send a frame and wait for its forces: count = rows * cols values, as for dermis_reconstruct. *result belongs to the caller:
 /// dermis_result_free; it is NULL after an error. Of a core behind Ethernet dermis_result_time says when the core had the frame,
 /// nanoseconds since 1970, and error_ns, which may be NULL, by how much that may be wrong; of another board error_ns is 0.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_board_frame(
     board: *mut dermis_board,
     stress_MPa: *const f64,

@@ -217,13 +217,13 @@ pub unsafe fn free<T>(handle: *mut T) {
 
 /// The text of the last error on this thread, with field and value; empty if there was none. It is overwritten by the next
 /// error on the same thread, and not freed.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub extern "C" fn dermis_last_error() -> *const c_char {
     LAST.with_borrow(|last| last.as_ptr())
 }
 
 /// The version of the library, as in Cargo.toml; not freed.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub extern "C" fn dermis_version() -> *const c_char {
     const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
         Ok(version) => version,

@@ -121,7 +121,7 @@ impl Wire<'_> {
 /// Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene
 /// may be freed before it. After an error *link is NULL; DERMIS_STATUS_INPUT for a scene whose hardware cannot have a link.
 /// cross_check is that of dermis_stream_new: the frames that are answered are a stream.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_new(
     scene: *const dermis_scene,
     cross_check: u64,
@@ -146,13 +146,13 @@ pub unsafe extern "C" fn dermis_link_new(
 }
 
 /// Free a link; NULL is allowed. Results that it gave stay valid.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_free(link: *mut dermis_link) {
     unsafe { free(link) }
 }
 
 /// The largest number of bytes that a request has on the wire; 0 after an error.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_capacity(link: *const dermis_link) -> usize {
     attempt(|| {
         let [(_, codes), ..] = payloads(&unsafe { reference("link", link) }?.model);
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn dermis_link_capacity(link: *const dermis_link) -> usize
 
 /// Write the request for the board's identity to wire, which has room for capacity bytes, and their number to size. Send it
 /// first: its answer tells whether the board was built for the scene.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_identify(
     link: *mut dermis_link,
     wire: *mut u8,
@@ -181,7 +181,7 @@ pub unsafe extern "C" fn dermis_link_identify(
 /// Write the request for the forces of a frame, or with forces = false for its resultants, to wire, which has room for
 /// capacity bytes, and their number to size. stress_MPa has count = rows * cols values, as for dermis_reconstruct. A board
 /// takes up to three requests before it has answered the first.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_frame(
     link: *mut dermis_link,
     stress_MPa: *const f64,
@@ -219,7 +219,7 @@ pub unsafe extern "C" fn dermis_link_frame(
 ///
 /// DERMIS_STATUS_DAMAGED: a packet was damaged on the wire; make the request again. DERMIS_STATUS_BOARD: the board was built
 /// for another scene or version. Both leave used written, and the link goes on.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_link_receive(
     link: *mut dermis_link,
     bytes: *const u8,

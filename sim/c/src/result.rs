@@ -137,13 +137,13 @@ impl dermis_result {
 }
 
 /// Free a result; NULL is allowed. Its JSON is freed with it.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_free(result: *mut dermis_result) {
     unsafe { free(result) }
 }
 
 /// Write the sum of the forces in N, x, y and normal, to the 3 values of force_N.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_resultant(result: *const dermis_result, force_N: *mut f64) -> dermis_status {
     guarded(|| {
         let result = unsafe { reference("result", result) }?;
@@ -154,7 +154,7 @@ pub unsafe extern "C" fn dermis_result_resultant(result: *const dermis_result, f
 
 /// Write when the last frame of the result was acquired to time_ns, as dermis_stream_push_at was told; of a block it is the last
 /// of its frames. DERMIS_STATUS_ABSENT if that was not stated.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_time(result: *const dermis_result, time_ns: *mut i64) -> dermis_status {
     guarded(|| {
         let output = unsafe { output("time_ns", time_ns) }?;
@@ -167,7 +167,7 @@ pub unsafe extern "C" fn dermis_result_time(result: *const dermis_result, time_n
 /// Write the force on each taxel in N to fx_N, fy_N and fz_N, which have room for as many values as there are taxels.
 /// DERMIS_STATUS_ABSENT if the result has resultants only: output.forces = "resultants" in the scene, or a frame sent for its
 /// resultants.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_forces(
     result: *const dermis_result,
     fx_N: *mut f64,
@@ -196,7 +196,7 @@ pub unsafe extern "C" fn dermis_result_forces(
 /// Write the contacts, at most capacity of them, and the number that the result has to count. With capacity 0, contacts may be
 /// NULL. DERMIS_STATUS_ABSENT, and a count of 0, if the result does not tell contacts apart: those of the estimators
 /// with evidence and of partition.case = "contacts" do.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_contacts(
     result: *const dermis_result,
     contacts: *mut dermis_contact,
@@ -214,7 +214,7 @@ pub unsafe extern "C" fn dermis_result_contacts(
 }
 
 /// Write the limitations of the result to flags, a sum of dermis_flag.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_flags(result: *const dermis_result, flags: *mut u32) -> dermis_status {
     guarded(|| {
         let flags = unsafe { output("flags", flags) }?;
@@ -226,7 +226,7 @@ pub unsafe extern "C" fn dermis_result_flags(result: *const dermis_result, flags
 /// The result as `dermis reconstruct --json` prints it, or for a frame sent for its resultants as a line of
 /// `dermis host --stream`: subarrays, figures behind the flags and all else. The text belongs to the result; NULL after an
 /// error.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_result_json(result: *const dermis_result) -> *const c_char {
     attempt(|| Ok(unsafe { reference("result", result) }?.json()?.as_ptr())).unwrap_or(std::ptr::null())
 }

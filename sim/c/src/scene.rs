@@ -70,7 +70,7 @@ pub(crate) unsafe fn one_frame(
 
 /// Load a scene by built-in name or by the path of its file, as the commands take it. The scene belongs to the caller:
 /// dermis_scene_free. After an error *scene is NULL.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_load(name: *const c_char, scene: *mut *mut dermis_scene) -> dermis_status {
     guarded(|| {
         let scene = unsafe { output("scene", scene) }?;
@@ -83,7 +83,7 @@ pub unsafe extern "C" fn dermis_scene_load(name: *const c_char, scene: *mut *mut
 
 /// Make a scene from the text of a scene file. origin is the path that stands in errors, and beside which the files are that
 /// the scene names. The scene belongs to the caller: dermis_scene_free. After an error *scene is NULL.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_parse(
     toml: *const c_char,
     origin: *const c_char,
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn dermis_scene_parse(
 }
 
 /// Free a scene; NULL is allowed. Its results and links stay valid.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_free(scene: *mut dermis_scene) {
     unsafe { free(scene) }
 }
@@ -109,20 +109,20 @@ fn number(scene: *const dermis_scene, of: impl FnOnce(&Scene) -> usize) -> usize
 }
 
 /// Number of rows, along y; 0 after an error.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_rows(scene: *const dermis_scene) -> usize {
     number(scene, |spec| spec.sensor.rows)
 }
 
 /// Number of columns, along x; 0 after an error.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_cols(scene: *const dermis_scene) -> usize {
     number(scene, |spec| spec.sensor.cols)
 }
 
 /// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean; 0 after an error. A sliding mean and a
 /// running zero take all frames since the start.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_scene) -> usize {
     number(scene, |spec| spec.input.frames_per_result())
 }
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_sce
 ///
 /// The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
 /// builds the model, which takes longer than the others.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_reconstruct(
     scene: *const dermis_scene,
     engine: *const c_char,

@@ -42,7 +42,7 @@ pub(crate) fn pace(cross_check: u64) -> CheckPace {
 /// where the engine has another one: every so many, from the first one on, before they are given; 0: none;
 /// DERMIS_CROSS_CHECK_BESIDE: the newest ones, as often as there is time. A finding is in the results up to the next one;
 /// checks.cross_check_age in the text of dermis_result_json says how many results ago.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stream_new(
     scene: *const dermis_scene,
     engine: *const c_char,
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn dermis_stream_new(
 }
 
 /// Free a stream; NULL is allowed. Results that it gave stay valid.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stream_free(stream: *mut dermis_stream) {
     unsafe { free(stream) }
 }
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn dermis_stream_free(stream: *mut dermis_stream) {
 ///
 /// A frame that is refused for its values has no part in the results; one that the engine refuses ends its block. Either way the
 /// stream goes on with the next frame.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stream_push(
     stream: *mut dermis_stream,
     stress_MPa: *const f64,
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn dermis_stream_push(
 
 /// As dermis_stream_push, of a frame that was acquired at time_ns: nanoseconds since 1970, or of any clock of the caller's.
 /// dermis_result_time gives it back to the nanosecond.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stream_push_at(
     stream: *mut dermis_stream,
     stress_MPa: *const f64,

@@ -21,7 +21,7 @@ impl dermis_scene {
 /// it is spread evenly. stress_MPa has room for count / 3 values, frame after frame of rows * cols: normal stress in MPa,
 /// compression positive, of the medium, without the noise and codes of a sensor. After an error what stress_MPa holds is not
 /// defined. The first call for a scene builds the model, which takes longer than the others.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stress(
     scene: *const dermis_scene,
     forces_N: *const f64,
@@ -41,7 +41,7 @@ pub unsafe extern "C" fn dermis_stress(
 ///
 /// at_mm has points * 2 values, x and y of each point in mm from the array's centre, also beside the array; forces_N has
 /// points * 3 values, x, y and normal force in N. stress_MPa has room for rows * cols values, as dermis_stress has them.
-#[no_mangle]
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn dermis_stress_of_points(
     scene: *const dermis_scene,
     at_mm: *const f64,

@@ -2,23 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail, Result};
+use anyhow::{bail, Result};
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
-use dermis_golden::spec::board::Board;
+use dermis_golden::spec::board::{Board, Tries};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::link::generate_board;
 
 use super::baseline::{self, Baseline, Baselines};
-use super::family::{flow, Routing, YOSYS};
+use super::family::{flow, Part, Routing, YOSYS};
 use super::floor_plan;
 use super::pins::check_pins;
+use super::place::{Design, Seeds};
 use super::register_packing::PackedRegisters;
 use super::synthesis::{self, NETLIST};
-use super::timing::{Fmax, Placed};
+use super::timing::{Clock, Placed, WantedClock};
 use super::tools::ToolError;
-use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use dermis_golden::quantile::median;
 
@@ -32,8 +32,8 @@ pub struct Made {
     pub achieved: Baseline,
     /// Registers that were moved into multipliers.
     pub packed: PackedRegisters,
-    /// The link's own clock with its pin, if the link has one.
-    pub link_clock: Option<(&'static str, Fmax)>,
+    /// The link's own clock, which has its pin's name, if the link has one.
+    pub link_clock: Option<Clock>,
     /// Path of the bitstream; none if a clock is missed.
     pub bitstream: Option<PathBuf>,
     /// Missed clocks and regressions against the baseline.
@@ -49,16 +49,6 @@ pub struct Effort {
     pub jobs: u32,
     /// If the clock is met, write the results into the baselines instead of comparing with them.
     pub update_baselines: bool,
-}
-
-/// A design on its way to a bitstream.
-struct Design<'a> {
-    model: &'a Model,
-    routing: &'a Routing,
-    /// Folder of all files.
-    folder: &'a Path,
-    /// Name of the pin file.
-    pins: &'a str,
 }
 
 /// Makes the bitstream of `model` in the folder `<build_dir>/<scene>/<board>`.
@@ -77,27 +67,48 @@ pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
         tool.version()?;
     }
     let folder = build_dir.join(&scene.name).join(&board.name);
-    let packed = synthesise(model, &folder)?;
-    let seeds = effort.seeds.unwrap_or(board.seeds);
-    let design = Design { model, routing, folder: &folder, pins: &pins };
-    let placed = place(&design, seeds, effort.jobs)?;
-    let better =
-        |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
-    let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
-        anyhow!("{}: none of {seeds} seeds could be placed and routed; logs in {}", scene.name, folder.display())
-    })?;
-    check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, routing.bitstream);
-    let achieved = summarise_seeds(routing, &placed, best);
-    let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
-    let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
+    let seeds = effort.seeds.unwrap_or(board.seeds);
+    let design = Design {
+        name: &board.name,
+        routing,
+        part: part(board),
+        folder: &folder,
+        netlist: NETLIST,
+        pins: &pins,
+        bitstream: &product,
+        clocks: clocks(model),
+        tries: Tries { seeds, ..board.tries() },
+    };
+    design.remove_bitstream()?;
+    let packed = synthesise(model, &folder)?;
+    let placed = design.place(Seeds::All { jobs: effort.jobs })?;
+    let best = &placed[0];
+    check_constraints(board, &best.clocks)?;
+    let achieved = summarise_seeds(routing, &placed);
+    let mut failures = best.missed();
     let met = failures.is_empty();
     if met {
-        let arguments = routing.pack_arguments(&format!("{}.config", seed_prefix(*best_seed)), &product);
-        routing.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
+        design.pack(best)?;
     }
     failures.extend(compare_or_update_baselines(effort.update_baselines && met, board, scene, &achieved)?);
-    Ok(Made { achieved, packed, link_clock: best.link, bitstream: met.then(|| folder.join(product)), failures })
+    let link_clock = best.clocks.get(1).cloned();
+    Ok(Made { achieved, packed, link_clock, bitstream: met.then(|| folder.join(product)), failures })
+}
+
+/// The board's device.
+fn part(board: &Board) -> Part {
+    // Present wherever there are pins.
+    let named = |name: &Option<String>| name.clone().unwrap_or_default();
+    Part { size: named(&board.size), package: named(&board.package), speed_grade: board.speed_grade }
+}
+
+/// The engine's clock, which the board's PLL makes, and that of the link where it has its own, by its pin (SPI).
+fn clocks(model: &Model) -> Vec<WantedClock> {
+    let engine = WantedClock { name: "clk".to_owned(), net: None, MHz: model.board.clock_MHz };
+    let link = model.scene.hardware.link.clock().zip(model.board.spi_MHz);
+    let link = link.map(|(pin, MHz)| WantedClock { name: pin.to_owned(), net: Some(pin.to_owned()), MHz });
+    [engine].into_iter().chain(link).collect()
 }
 
 /// Checks that the converters of a scan are on the board.
@@ -119,21 +130,15 @@ fn require_converters(model: &Model) -> Result<()> {
 }
 
 /// Checks that the clock constraints seen by place and route are those of the board's file.
-fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
-    let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
-    let (has, wants) = (placed.engine.constraint, board.clock_MHz);
-    if differs(has, wants) {
+fn check_constraints(board: &Board, clocks: &[Clock]) -> Result<()> {
+    let Some(Clock { wanted, fmax, .. }) = clocks.iter().find(|clock| !clock.is_constrained()) else { return Ok(()) };
+    let (wants, has) = (wanted.MHz, fmax.constraint);
+    let Some(pin) = &wanted.net else {
         let reason = format!("clock_MHz = {wants}, but the PLL of its Verilog gives {has} MHz");
         return Err(board.invalid("clock_MHz", reason).into());
-    }
-    if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
-        let (pins, has) = (board.path_of(board.pins.as_deref().unwrap_or_default()), clock.constraint);
-        if differs(has, wants) {
-            let reason = format!("spi_MHz = {wants}, but {pins} constrains {pin} to {has} MHz");
-            return Err(board.invalid("spi_MHz", reason).into());
-        }
-    }
-    Ok(())
+    };
+    let pins = board.path_of(board.pins.as_deref().unwrap_or_default());
+    Err(board.invalid("spi_MHz", format!("spi_MHz = {wants}, but {pins} constrains {pin} to {has} MHz")).into())
 }
 
 /// Synthesises the board's Verilog to the netlist for place and route.
@@ -165,63 +170,21 @@ fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     Ok(packed)
 }
 
-/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; returns the seeds that completed.
-fn place(design: &Design, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
-    let what = format!("{}: place and route", design.model.board.name);
-    let place = |seed| match place_seed(design, seed) {
-        // A seed that does not converge is skipped as long as there are others.
-        Err(ToolError::Late { .. } | ToolError::Stuck { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
-        placed => Ok(Some((seed, placed?))),
-    };
-    let placed = parallel(&what, (1..=seeds).collect(), jobs as usize, &Interrupt::default(), place)?;
-    Ok(placed.into_iter().flatten().collect())
-}
-
-/// Prefix of a seed's files.
-fn seed_prefix(seed: u32) -> String {
-    format!("seed{seed}")
-}
-
-/// Iterations of nextpnr's static placer after which it does not converge: where it does, it takes a third of them.
-const MOST_ITERATIONS: u32 = 1500;
-
-/// Whether the end of nextpnr's log says that its placer does not converge.
-fn is_stuck(log: &str) -> bool {
-    let iteration = log.rsplit_once("iter=").and_then(|(_, rest)| rest.split_whitespace().next()?.parse::<u32>().ok());
-    iteration.is_some_and(|iteration| iteration > MOST_ITERATIONS)
-}
-
-/// Places and routes one seed with the first of the board's placers that converges.
-fn place_seed(design: &Design, seed: u32) -> Result<Placed, ToolError> {
-    let Design { model, routing, folder, pins } = design;
-    let board = &model.board;
-    let name = seed_prefix(seed);
-    let mut last = Err(ToolError::Missing { tool: routing.place.name });
-    for placer in &board.placers {
-        let arguments = routing.place_arguments(board, [NETLIST, pins], seed, placer, &name);
-        let log = format!("{name}.{placer}.log");
-        last = routing.place.run_unless(folder, &arguments, &log, board.place_minutes, is_stuck);
-        if last.is_ok() {
-            break;
-        }
-    }
-    last?;
-    let report = folder.join(format!("{name}.report.json"));
-    Placed::read(&report, synthesis::cells(folder, TOP)?, model.scene.hardware.link.clock())
-}
-
-/// Clock figures over all seeds, and the cells of the `best`.
-fn summarise_seeds(routing: &Routing, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+/// The engine's clock over all seeds, and the cells of the best one, the first.
+fn summarise_seeds(routing: &Routing, placed: &[Placed]) -> Baseline {
+    let engine = |placed: &Placed| placed.clocks[0].fmax.achieved;
     // The median is taken of periods: of an even number of seeds it is then the slower of the two middle ones.
-    let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
+    let periods = || placed.iter().map(|placed| 1.0 / engine(placed));
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
+    let best = &placed[0];
+    let count = |prefix| best.count(prefix).used;
     Baseline {
-        luts: best.count(routing.lut),
-        flip_flops: best.count(routing.flip_flop),
-        multipliers: best.count(routing.multiplier),
-        block_rams: best.count(routing.block_ram),
-        best_MHz: rounded(best.engine.achieved),
-        median_MHz: rounded(median(periods().collect()).map_or(best.engine.achieved, |period| 1.0 / period)),
+        luts: count(routing.lut),
+        flip_flops: count(routing.flip_flop),
+        multipliers: count(routing.multiplier),
+        block_rams: count(routing.block_ram),
+        best_MHz: rounded(engine(best)),
+        median_MHz: rounded(median(periods().collect()).map_or(engine(best), |period| 1.0 / period)),
         worst_MHz: rounded(1.0 / periods().fold(0.0, f64::max)),
         seeds: placed.len() as u32,
     }
@@ -242,18 +205,25 @@ fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achie
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::timing::Fmax;
     use std::collections::BTreeMap;
 
+    fn clock(net: Option<&str>, MHz: f64, achieved: f64, constraint: f64) -> Clock {
+        let wanted = WantedClock { name: String::new(), net: net.map(str::to_owned), MHz };
+        Clock { wanted, fmax: Fmax { achieved, constraint }, longest_path: None }
+    }
+
     fn placed(achieved: f64) -> Placed {
-        Placed { engine: Fmax { achieved, constraint: 100.0 }, link: None, cells: BTreeMap::new() }
+        let clocks = vec![clock(None, 100.0, achieved, 100.0)];
+        Placed { seed: 1, placer: String::new(), clocks, cells: BTreeMap::new() }
     }
 
     #[test]
     fn the_median_of_two_seeds_is_the_slower_one() {
-        let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
+        let seeds = [107.2, 94.52, 101.0].map(placed);
         let routing = flow(dermis_golden::spec::board::Family::Ecp5).routing.unwrap();
-        let clocks = |seeds: &[(u32, Placed)]| {
-            let achieved = summarise_seeds(&routing, seeds, &seeds[1].1);
+        let clocks = |seeds: &[Placed]| {
+            let achieved = summarise_seeds(&routing, seeds);
             [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]
         };
         assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
@@ -261,21 +231,11 @@ mod tests {
     }
 
     #[test]
-    fn a_placer_is_stuck_after_many_iterations() {
-        let log =
-            |iteration: u32| format!("Info: iter={iteration} steplen=1.9 a=1.0\nInfo: overlap: COMB=4.7%, RAM=24.8%\n");
-        assert!([log(1500), String::new(), "iter=".into()].iter().all(|log| !is_stuck(log)));
-        assert!(is_stuck(&(log(1500) + &log(1501))));
-    }
-
-    #[test]
     fn a_clock_constraint_that_differs_from_the_board_file_is_an_error() {
         let board = Board::load("icebreaker").unwrap();
         let check = |engine: f64, link: f64| {
-            let clock = |constraint| Fmax { achieved: 99.0, constraint };
-            let link = Some(("spi_sclk", clock(link)));
-            let placed = Placed { engine: clock(engine), link, cells: BTreeMap::new() };
-            check_constraints(&board, &placed).map_err(|error| error.to_string())
+            let clocks = [clock(None, 25.5, 99.0, engine), clock(Some("spi_sclk"), 25.0, 99.0, link)];
+            check_constraints(&board, &clocks).map_err(|error| error.to_string())
         };
         assert_eq!(check(25.505, 25.0), Ok(()));
         let wanted = "constraints/icebreaker.toml, line 14: clock_MHz = 25.5, but the PLL of its Verilog gives 12 MHz";

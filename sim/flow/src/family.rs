@@ -1,6 +1,6 @@
 //! Tools, commands and cell names of each device family.
 
-use dermis_golden::spec::board::{Board, Family};
+use dermis_golden::spec::board::Family;
 
 use super::tools::Tool;
 
@@ -16,6 +16,7 @@ pub struct Flow {
 }
 
 /// Tools that make a bitstream of a netlist, and names of the cells that are then counted.
+#[derive(Debug)]
 pub struct Routing {
     /// The tool for place and route.
     pub place: Tool,
@@ -42,6 +43,17 @@ pub struct Routing {
     pub multiplier: &'static str,
     /// Prefix of block RAM cells.
     pub block_ram: &'static str,
+}
+
+/// A device as the tool for place and route names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Size within the family, e.g. `85k`.
+    pub size: String,
+    /// Package name.
+    pub package: String,
+    /// Speed grade; `None` where the family has one only.
+    pub speed_grade: Option<u32>,
 }
 
 /// The flow of a family.
@@ -101,19 +113,18 @@ impl Routing {
     /// begin with `name`.
     pub fn place_arguments(
         &self,
-        board: &Board,
+        part: &Part,
         [netlist, pins]: [&str; 2],
         seed: u32,
         placer: &str,
         name: &str,
     ) -> Vec<String> {
-        // Present wherever there are pins.
-        let part = |part: &Option<String>| part.clone().unwrap_or_default();
-        let (size, package) = (format!("--{}", part(&board.size)), part(&board.package));
+        let size = format!("--{}", part.size);
         let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
         let seed = seed.to_string();
-        let mut arguments = vec![&*size, "--package", &*package, self.pins, pins, self.configuration, &*configuration];
-        let speed = board.speed_grade.map(|speed| speed.to_string());
+        let mut arguments =
+            vec![&*size, "--package", &part.package, self.pins, pins, self.configuration, &configuration];
+        let speed = part.speed_grade.map(|speed| speed.to_string());
         if let (Some(option), Some(speed)) = (self.speed_grade, &speed) {
             arguments.extend([option, &**speed]);
         }

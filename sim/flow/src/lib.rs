@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! scene -> board top (Verilog) --yosys--> netlist --register packing, floor plan--> netlist
-//!     netlist --nextpnr, several seeds--> best --pack--> bitstream
+//!     netlist --nextpnr, several seeds--> best --pack--> bitstream    ([`place`]: of any netlist)
 //!             ^-- pins, PLL of the board       |--> cells, clocks -> table, baselines
 //! ```
 //! All files and one log per tool lie in `<build-dir>/<scene>/<board>/`. [`microcontroller`] writes the bit-true engine of a scene as C99,
@@ -29,6 +29,7 @@ pub mod jobs;
 pub mod microcontroller;
 pub mod netlist;
 pub mod pins;
+pub mod place;
 pub mod progress;
 pub mod register_packing;
 pub mod synthesis;

@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::family::{flow, YOSYS};
 use super::register_packing::{pack_registers, PackedRegisters};
+use super::timing::Used;
 use super::tools::ToolError;
 
 /// File name of the netlist, in Yosys's JSON format.
@@ -45,15 +46,17 @@ pub fn run(folder: &Path, script: String, log: &str) -> Result<(), ToolError> {
     YOSYS.run(folder, &["-q".to_owned(), "-p".to_owned(), script], log, MINUTES)
 }
 
-/// Number of cells of each type in module `top` of the netlist in `folder`.
+/// Number of cells of each type in the outermost module of a netlist.
 ///
 /// # Errors
 /// [`ToolError`]: a file that cannot be read or parsed.
-pub fn cells(folder: &Path, top: &str) -> Result<BTreeMap<String, u64>, ToolError> {
-    let netlist = read(&folder.join(NETLIST))?;
-    let mut counts = BTreeMap::new();
-    for cell in netlist["modules"][top]["cells"].as_object().into_iter().flat_map(|cells| cells.values()) {
-        *counts.entry(cell["type"].as_str().unwrap_or_default().to_owned()).or_default() += 1;
+pub fn cells(path: &Path) -> Result<BTreeMap<String, Used>, ToolError> {
+    let netlist = read(path)?;
+    let mut modules = netlist["modules"].as_object().into_iter().flat_map(|modules| modules.values());
+    let top = modules.find(|module| module["attributes"].get("top").is_some());
+    let mut counts = BTreeMap::<String, Used>::new();
+    for cell in top.and_then(|top| top["cells"].as_object()).into_iter().flat_map(|cells| cells.values()) {
+        counts.entry(cell["type"].as_str().unwrap_or_default().to_owned()).or_default().used += 1;
     }
     Ok(counts)
 }

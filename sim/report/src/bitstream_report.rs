@@ -60,7 +60,7 @@ pub struct BitstreamReport {
     /// Number of block RAMs whose output registers are used.
     pub registered_block_rams: usize,
     /// The link's own clock with its pin, if the link has one.
-    pub link_clock: Option<(&'static str, Fmax)>,
+    pub link_clock: Option<(String, Fmax)>,
     /// Path of the bitstream; none if a clock is missed.
     pub bitstream: Option<PathBuf>,
     /// Missed clocks and regressions against the baseline.
@@ -76,7 +76,7 @@ impl BitstreamReport {
             summary: Summary::new(model, achieved),
             packed_registers: [packed.operands, packed.products],
             registered_block_rams: packed.block_rams,
-            link_clock,
+            link_clock: link_clock.map(|clock| (clock.wanted.name, clock.fmax)),
             bitstream,
             failures,
         }

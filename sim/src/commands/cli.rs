@@ -78,6 +78,8 @@ enum Command {
     Build(super::build::Arguments),
     /// Make the bitstream of a scene for its board with open tools.
     Bitstream(super::bitstream::Arguments),
+    /// Place and route a netlist of another design, and make its bitstream.
+    Place(super::place::Arguments),
     /// Check a scene: model, board, expected errors; or a generated folder against its manifest.json.
     Check(super::check::Arguments),
     /// Write a scene for a new sensor, with comments; asks for what is missing.
@@ -236,6 +238,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Cosim(arguments) => super::cosim::run(arguments, build_dir),
         Command::Load(arguments) => Ok((super::load::run(arguments, build_dir)?, true)),
         Command::Bitstream(arguments) => super::bitstream::run(arguments, build_dir),
+        Command::Place(arguments) => super::place::run(arguments),
         Command::Check(arguments) => Ok((super::check::run(arguments)?, true)),
         Command::New(arguments) => Ok((super::new::run(arguments)?, true)),
         Command::Calibrate(arguments) => Ok((super::calibrate::run(arguments)?, true)),

@@ -23,6 +23,7 @@
 //! | [`live`] | `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger |
 //! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
+//! | [`place`] | `dermis place`: place and route of a netlist that is not of a scene and a board |
 //! | [`mod@power`] | `dermis power`: the engine's power, estimated |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
@@ -67,6 +68,7 @@ pub mod live;
 mod load;
 pub mod new;
 pub mod noise;
+pub mod place;
 pub mod power;
 pub mod reconstruct;
 mod reconstruct_stream;

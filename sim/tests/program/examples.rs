@@ -36,6 +36,12 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 10 --save readings", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 1000 --stream >answers", BOARD),
     ("dermis load hand.toml left-hand.toml --port /dev/ttyUSB0", BOARD),
+    ("dermis place top.json --family ecp5 --size 25k --package CABGA256 --speed-grade 6 --clock clk=pll_clkout:50", PLACE),
+    (
+        "dermis place board.ys --family ecp5 --size 45k --package CABGA381 --speed-grade 6 --clock core=pll:62.5 --clock rx=eth_rx:125",
+        PLACE,
+    ),
+    ("dermis place top.json --family ice40 --size up5k --package sg48 --clock clk=clk12:12 --seeds 10", PLACE),
     ("dermis board eight-by-eight", "runs until interrupted; host.rs talks to one"),
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
@@ -109,6 +115,7 @@ const SOURCE: &str = "runs until interrupted; live_sources.rs";
 const PAGE: &str = "runs until interrupted; live.rs";
 const IMPORTED: &str = "needs an imported recording; report.rs";
 const BOARD: &str = "needs a board on a serial port";
+const PLACE: &str = "needs the files of a design; place.rs";
 const PAGES: &str = "needs the repository's pages; guide.rs";
 const PLACED: &str = "place and route takes from minutes to hours; make bitstream";
 

@@ -20,6 +20,7 @@ mod live_sources;
 mod lost_bytes;
 mod network;
 mod page;
+mod place;
 mod printed;
 mod recording;
 mod report;

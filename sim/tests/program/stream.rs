@@ -19,7 +19,7 @@ fn dermis(more: &[&str]) -> Child {
 }
 
 /// Stdout line by line, as JSON.
-fn answers(child: &mut Child) -> impl Iterator<Item = Value> {
+fn answers(child: &mut Child) -> impl Iterator<Item = Value> + use<> {
     let lines = BufReader::new(child.stdout.take().unwrap() as ChildStdout).lines();
     lines.map(|line| serde_json::from_str(&line.unwrap()).unwrap())
 }

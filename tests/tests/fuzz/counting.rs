@@ -38,11 +38,11 @@ pub fn most_since(mark: isize) -> usize {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as isize);
-        System.alloc(layout)
+        unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         count(-(layout.size() as isize));
-        System.dealloc(pointer, layout);
+        unsafe { System.dealloc(pointer, layout) };
     }
 }

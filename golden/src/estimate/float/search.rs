@@ -90,10 +90,10 @@ impl GridSearch<'_> {
         self.evaluations += 1;
         self.family.eval_into(self.mu(position), &mut self.p);
         let score = (self.score)(&self.p).filter(|score| score.is_finite());
-        if let Some(score) = score {
-            if self.best.is_none_or(|(_, best)| score > best) {
-                self.best = Some((position, score));
-            }
+        if let Some(score) = score
+            && self.best.is_none_or(|(_, best)| score > best)
+        {
+            self.best = Some((position, score));
         }
     }
 

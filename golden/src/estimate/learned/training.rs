@@ -133,17 +133,17 @@ pub(super) fn train(
             measured = Instant::now();
             run.errors()
         });
-        if let Some(own) = errors.map(|errors| errors.iter().sum::<f64>()) {
-            if best.as_ref().is_none_or(|(least, _)| own < *least) {
-                best = Some((own, run.mean.clone()));
-            }
+        if let Some(own) = errors.map(|errors| errors.iter().sum::<f64>())
+            && best.as_ref().is_none_or(|(least, _)| own < *least)
+        {
+            best = Some((own, run.mean.clone()));
         }
         let loss = mean(&run.losses[run.losses.len() - EVERY..]);
         if progress(&Stage { done, steps: run.losses.len(), loss, errors }).is_break() {
-            if let Some((least, network)) = best {
-                if least < run.errors().iter().sum::<f64>() {
-                    run.mean = network;
-                }
+            if let Some((least, network)) = best
+                && least < run.errors().iter().sum::<f64>()
+            {
+                run.mean = network;
             }
             break;
         }

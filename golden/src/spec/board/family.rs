@@ -47,6 +47,36 @@ impl Family {
             Family::Artix7 => None,
         }
     }
+
+    /// How place and route is tried where no board's file says it.
+    ///
+    /// # Errors
+    /// [`BoardError::Unreadable`] if a built-in file is damaged.
+    pub fn tries(self) -> Result<Tries, BoardError> {
+        let FamilyFile { figures, .. } = FamilyFile::load(self)?;
+        Value::Table(figures).try_into().map_err(|error: toml::de::Error| unreadable(self, error.to_string()))
+    }
+}
+
+/// The path of a family's file, relative to the folder of built-in files.
+fn file_of(family: Family) -> String {
+    format!("families/{}.toml", family.name())
+}
+
+fn unreadable(family: Family, reason: String) -> BoardError {
+    BoardError::Unreadable { file: Folder::BuiltIn.path().join(file_of(family)).display().to_string(), reason }
+}
+
+/// How often, with what and for how long place and route is tried.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Tries {
+    /// Seeds 1 … `seeds`, > 0.
+    pub seeds: u32,
+    /// Placers in the order in which they are tried, at least one.
+    pub placers: Vec<String>,
+    /// Time limit of one try, min, > 0.
+    #[serde(rename = "place_minutes")]
+    pub minutes: u32,
 }
 
 /// The file of a family.
@@ -64,11 +94,8 @@ struct FamilyFile {
 
 impl FamilyFile {
     fn load(family: Family) -> Result<FamilyFile, BoardError> {
-        let name = format!("families/{}.toml", family.name());
-        let file = Folder::BuiltIn.path().join(&name).display().to_string();
-        let unreadable = |reason: String| BoardError::Unreadable { file: file.clone(), reason };
-        let text = Folder::BuiltIn.read(&name).map_err(|error| unreadable(error.to_string()))?;
-        toml::from_str(&text).map_err(|error| unreadable(error.to_string()))
+        let text = Folder::BuiltIn.read(&file_of(family)).map_err(|error| unreadable(family, error.to_string()))?;
+        toml::from_str(&text).map_err(|error| unreadable(family, error.to_string()))
     }
 }
 

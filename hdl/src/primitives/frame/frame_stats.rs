@@ -124,11 +124,10 @@ mod tests {
             let code = inputs[2].signed(0, BITS);
             if inputs[0].number() == 1 {
                 self.each = vec![(0, false, false); self.parts];
-            } else if inputs[1].number() == 1 {
-                if let Some(seen) = self.each.get_mut(inputs[3].number() as usize) {
-                    *seen =
-                        (seen.0 | magnitude_bits(code), seen.1 | (code > self.floor), seen.2 | (code < -self.floor));
-                }
+            } else if inputs[1].number() == 1
+                && let Some(seen) = self.each.get_mut(inputs[3].number() as usize)
+            {
+                *seen = (seen.0 | magnitude_bits(code), seen.1 | (code > self.floor), seen.2 | (code < -self.floor));
             }
         }
     }
