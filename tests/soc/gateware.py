@@ -4,7 +4,7 @@ import re
 import shutil
 import subprocess
 
-from dermis_litex import Dermis, DermisUDP
+from dermis_litex import Arbiter, Dermis, DermisUDP
 from dermis_litex.network import IP_ADDRESS, MAC_ADDRESS
 from dermis_litex.network import Network as LiteEth
 from dermis_litex.packets import UDP_PORT
@@ -53,6 +53,26 @@ class Packets(LiteXModule):
             for end in ("source", "sink")
             for signal in getattr(self.port, end).flatten()
         }
+
+
+class BehindArbiter(LiteXModule):
+    """A core behind its arbiter, with the pins of an AXI4-Stream for each array and for the results, and those of Wishbone."""
+
+    def __init__(self, folder):
+        self.cd_sys = ClockDomain()
+        self.platform, self.reset_n = Sources(), Signal()
+        self.core = Dermis(self.platform, folder)
+        self.arbiter = Arbiter(self.platform, self.core)
+        self.comb += self.cd_sys.rst.eq(~self.reset_n)
+
+    def pins(self):
+        ends = {f"s{array}_axis": (sink, ["data"]) for array, sink in enumerate(self.arbiter.sinks)}
+        ends["m_axis"] = self.core.source, ["data", "keep", "user", "id"]
+        streams = {
+            f"{prefix}_t{name}": getattr(end, name) for prefix, (end, own) in ends.items() for name in ["valid", "ready", "last", *own]
+        }
+        bus = {f"wb_{name}": getattr(self.core.bus, name) for name in "cyc stb we adr dat_w sel ack err dat_r".split()}
+        return {"aclk": self.cd_sys.clk, "aresetn": self.reset_n} | streams | bus
 
 
 class Phy(LiteXModule):

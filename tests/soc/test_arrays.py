@@ -6,6 +6,8 @@ import shutil
 import subprocess
 
 import pytest
+from dermis_litex import CoreError
+from gateware import BehindArbiter, write_verilog
 from test_cores import BUILD, DERMIS, HERE, environment, generate, icarus
 
 ARRAYS = 4
@@ -77,18 +79,22 @@ def behind_arbiter(core):
     )
 
 
-def simulate(scene, folder, change=lambda text: text, module="arrays"):
-    generate(folder, "--bus", "axi", "--stream-bits", "64", scene=scene)
-    verilog = folder / "dermis_arrays_axi.v"
+def simulate(scene, folder, change=lambda text: text, module="arrays", bus="axi", sinks=lambda all: all):
+    generate(folder, "--bus", bus, "--stream-bits", "64", scene=scene)
+    verilog = folder / f"dermis_arrays_{bus}.v"
     verilog.write_text(change(verilog.read_text(encoding="utf-8")), encoding="utf-8")
     alone = BUILD / "arrays/alone-{}/dermis_arrays_tb_beats.hex"
     more = {"DERMIS_ARRAYS": str(ARRAYS), "DERMIS_ALONE": str(alone)}
     more |= {"DERMIS_IMAGE": str(BUILD / "arrays/first.tables"), "DERMIS_VERSION": str(VERSION)}
     if "DERMIS_NIGHTLY" in os.environ:
         more["DERMIS_ROUNDS"] = "200"
-    more = environment("axi", 64, BUILD / "arrays/alone-0/dermis_arrays_tb") | more
+    more = environment(bus, 64, BUILD / "arrays/alone-0/dermis_arrays_tb") | more
     if module == "arrays":
         return icarus(folder, "dermis_arrays_axi", [verilog], module, more)
+    if bus == "wishbone":
+        in_litex = BehindArbiter(folder)
+        in_litex.arbiter.sinks = sinks(in_litex.arbiter.sinks)
+        return icarus(folder, "behind_arbiter", write_verilog(in_litex, in_litex.pins(), folder, "behind_arbiter"), module, more)
     top = folder / "behind_arbiter.v"
     top.write_text(behind_arbiter(verilog.read_text(encoding="utf-8")), encoding="utf-8")
     arbiter = folder / "dermis_arrays_axi_arbiter.v"
@@ -101,6 +107,22 @@ def test_arrays(arrays_scene):
 
 def test_each_array_has_a_sender_of_its_own(arrays_scene):
     assert simulate(arrays_scene, BUILD / "arrays/arbiter", module="arbiter") == (2, 0)
+
+
+def test_each_array_has_a_sender_of_its_own_in_litex(arrays_scene):
+    assert simulate(arrays_scene, BUILD / "arrays/litex", module="arbiter", bus="wishbone") == (2, 0)
+
+
+def test_a_sender_of_another_array_is_found(arrays_scene):
+    of_another = lambda sinks: sinks[::-1]
+    tests, failed = simulate(arrays_scene, BUILD / "arrays/swapped", module="arbiter", bus="wishbone", sinks=of_another)
+    assert tests == 2 and failed > 0
+
+
+def test_a_core_of_one_array_has_no_arbiter(arrays_scene):
+    generate(BUILD / "arrays/one", "--bus", "wishbone", scene=f"{arrays_scene}#0")
+    with pytest.raises(CoreError, match="manifest.json: no core.arbiter, and hardware.arrays = 1"):
+        BehindArbiter(BUILD / "arrays/one")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from litex.gen import ClockSignal, If, Instance, LiteXModule, Mux, ResetSignal, Signal
+from litex.gen import Cat, ClockSignal, If, Instance, LiteXModule, Mux, ResetSignal, Signal
 from litex.soc.interconnect import stream, wishbone
 
 WORD_BITS = 32
@@ -123,12 +123,13 @@ class Dermis(LiteXModule):
     - `arrays`, `array_bits`: how many it serves, and the bits of `id` that name one.
     - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
     - `force_words`: how many of those are forces, or resultants.
+    - `folder`: the folder of the core.
 
     The Verilog and its memory files are added to `platform`.
     """
 
     def __init__(self, platform, folder):
-        folder = Path(folder).resolve()
+        self.folder = folder = Path(folder).resolve()
         self.manifest = read_manifest(folder)
         registers = read_json(folder / "registers.json")
         self.constants = constants = registers["constants"]
@@ -183,3 +184,40 @@ class Dermis(LiteXModule):
         for name in self.manifest["files"]:
             if name.startswith(f"{top}__"):
                 platform.add_source(str(folder / name), copy=True)
+
+
+class Arbiter(LiteXModule):
+    """What gives each array of a core of several arrays a stream of its own: a frame waits in it until it is whole, and frames go to the
+    core in turn, so that a sender that stalls keeps no other waiting.
+
+    - `sinks`: a taxel's code per beat of each array, 32 bits signed, row-major; `last` on a frame's last taxel.
+
+    It drives `sink` of `core`. Raises `CoreError` for a core of one array.
+    """
+
+    def __init__(self, platform, core):
+        name = core.manifest["core"].get("arbiter")
+        if name is None:
+            raise CoreError(f"{core.folder / 'manifest.json'}: no core.arbiter, and hardware.arrays = {core.arrays}; an arbiter is of several")
+        self.sinks = sinks = [stream.Endpoint([("data", WORD_BITS)]) for _ in range(core.arrays)]
+
+        # # #
+
+        ready, keep = Signal(core.arrays), Signal(WORD_BITS // 8)
+        self.comb += [sink.ready.eq(ready[array]) for array, sink in enumerate(sinks)]
+        self.specials += Instance(
+            name,
+            i_aclk=ClockSignal(),
+            i_aresetn=~ResetSignal(),
+            i_s_axis_tdata=Cat(*(sink.data for sink in sinks)),
+            i_s_axis_tvalid=Cat(*(sink.valid for sink in sinks)),
+            o_s_axis_tready=ready,
+            i_s_axis_tlast=Cat(*(sink.last for sink in sinks)),
+            o_m_axis_tdata=core.sink.data,
+            o_m_axis_tkeep=keep,
+            o_m_axis_tid=core.sink.id,
+            o_m_axis_tvalid=core.sink.valid,
+            i_m_axis_tready=core.sink.ready,
+            o_m_axis_tlast=core.sink.last,
+        )
+        platform.add_source(str(core.folder / f"{name}.v"))
