@@ -48,6 +48,7 @@ pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use rate::Clock;
+pub use reader::{DueFrame, Input};
 pub use source::Source;
 pub(crate) use source::DATAGRAM;
 pub use stop::Stop;

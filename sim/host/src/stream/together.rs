@@ -1,4 +1,5 @@
-//! Several streams that one thread answers, in turn: each has a thread that reads, a queue, and what its frames so far show.
+//! Several streams that one thread answers, in turn: each has a queue, a thread that fills it unless it is known when its frames are due,
+//! and what its frames so far show.
 //!
 //! ```text
 //! source 0 ── queue ─┐ bell
@@ -8,16 +9,16 @@
 //! A stream that has many lines is answered once, then the others that have one; what its queue does not hold meanwhile waits or is
 //! dropped, by its policy, and harms no other stream.
 
-use std::io::{Error as IoError, ErrorKind, Read, Result as IoResult};
+use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::sync::mpsc::{channel, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Error, Result};
 
 use super::answers::{Counts, Outcome, Output, Stream, StreamOptions};
 use super::estimators::Estimators;
 use super::queue::{Bell, Policy, Taken};
-use super::reader::Lines;
+use super::reader::{Input, Lines};
 use super::stop::Stop;
 use super::zero::ZeroRequest;
 
@@ -29,7 +30,7 @@ pub struct Member<'a> {
     /// What computes the results.
     pub estimators: Estimators<'a>,
     /// The source of its lines, and its name in errors.
-    pub input: (Box<dyn Read + Send>, String),
+    pub input: (Input, String),
     /// How it is read.
     pub options: StreamOptions,
     /// Asks for a new zero.
@@ -46,7 +47,7 @@ pub type Outputs<'a> = dyn FnMut(usize, &Outcome) -> IoResult<()> + 'a;
 /// Input or output that fails; a bad line is none.
 pub fn run(
     estimators: Estimators,
-    input: (Box<dyn Read + Send>, &str),
+    input: (impl Into<Input>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
@@ -60,11 +61,11 @@ pub fn run(
 pub fn run_until(
     stop: &Stop,
     estimators: Estimators,
-    (input, name): (Box<dyn Read + Send>, &str),
+    (input, name): (impl Into<Input>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
-    let own = Member { estimators, input: (input, name.to_owned()), options, zero: ZeroRequest::default() };
+    let own = Member { estimators, input: (input.into(), name.to_owned()), options, zero: ZeroRequest::default() };
     let named = |error: IoError| match error.kind() {
         ErrorKind::BrokenPipe => error,
         kind => IoError::new(kind, format!("standard output: {error}")),
@@ -88,7 +89,7 @@ impl Running<'_> {
         self.stream.dropped(if self.options.policy == Policy::Latest { full } else { 0 });
         let (done, next) = match item {
             Some(received) => {
-                (self.stream.answer(&received, if self.options.live { full } else { 0 }, output), Next::More)
+                (self.stream.answer(received, if self.options.live { full } else { 0 }, output), Next::More)
             }
             None if ended => (self.stream.finish(output), Next::Ended),
             None => (Ok(()), Next::More),
@@ -136,9 +137,14 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
         let lines = Lines::begin(input, (options.queue, options.policy), clock, Bell::new(index, ring.clone()), stop);
         running.push(Some(Running { stream, lines, options }));
     }
+    let mut due = vec![Some(Instant::now()); running.len()];
     while done.iter().any(Option::is_none) && !stop.stopped() {
         let waits = running.iter().flatten().any(|member| member.stream.waiting().is_some());
-        let heard = if waits { rung.recv_timeout(QUIET) } else { rung.recv().map_err(RecvTimeoutError::from) };
+        let until_due = bring(&mut running, &mut due).map(|at| at.saturating_duration_since(Instant::now()));
+        let heard = match until_due.into_iter().chain(waits.then_some(QUIET)).min() {
+            Some(most) => rung.recv_timeout(most),
+            None => rung.recv().map_err(RecvTimeoutError::from),
+        };
         for (index, member) in running.iter_mut().enumerate().filter(|_| waits) {
             match member.as_mut().map_or(Next::More, |member| member.settle(&mut |outcome| output(index, outcome))) {
                 Next::More => (),
@@ -162,6 +168,15 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
     let stopped =
         |member: Option<Running>| member.map_or_else(|| Ok(Counts::default()), |member| member.end(Next::More));
     all.map(|(member, done)| done.unwrap_or_else(|| stopped(member))).collect()
+}
+
+/// Puts the frames that are due into the queues, at most one of each stream; when the next one is due. `due` has that of each stream.
+fn bring(running: &mut [Option<Running>], due: &mut [Option<Instant>]) -> Option<Instant> {
+    let now = Instant::now();
+    for (due, member) in std::iter::zip(&mut *due, running).filter(|(due, _)| due.is_some_and(|at| at <= now)) {
+        *due = member.as_mut().and_then(|member| member.lines.bring(now));
+    }
+    due.iter().flatten().min().copied()
 }
 
 /// What comes of a line.
@@ -193,7 +208,7 @@ mod tests {
     use dermis_golden::engine::CheckPace;
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, Scene};
-    use std::io::Cursor;
+    use std::io::{Cursor, Read};
 
     const OPTIONS: StreamOptions = StreamOptions {
         queue: 2,
@@ -210,7 +225,7 @@ mod tests {
         let mut seen: Seen = vec![Default::default(); inputs.len()];
         let member = |input| Member {
             estimators: Estimators::only(engine, CheckPace::Never),
-            input: (input, "memory".to_owned()),
+            input: (Input::Bytes(input), "memory".to_owned()),
             options: OPTIONS,
             zero: ZeroRequest::default(),
         };
@@ -292,7 +307,7 @@ mod tests {
         let (engine, line) = (Golden::new(&scene).unwrap(), lines(&Frame::shipped(&scene)[..1]));
         let member = |input, queue, policy| Member {
             estimators: Estimators::only(&engine, CheckPace::Never),
-            input: (input, "memory".to_owned()),
+            input: (Input::Bytes(input), "memory".to_owned()),
             options: StreamOptions { queue, policy, live: true, ..OPTIONS },
             zero: ZeroRequest::default(),
         };
