@@ -22,7 +22,9 @@ use crate::live::{Hand, Newest, Server, Show};
 use dermis_host::engine::EngineName;
 use dermis_host::link::{open_board, BoardEngine, Session};
 use dermis_host::recording::{Pace, Paced};
-use dermis_host::stream::{run as run_stream, Clock, Estimators, Faster, Input, Outcome, Policy, Source, StreamOptions};
+use dermis_host::stream::{
+    run as run_stream, Clock, Estimators, Faster, Input, Outcome, Policy, Source, StreamOptions,
+};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]

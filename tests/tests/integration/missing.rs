@@ -131,8 +131,7 @@ fn every_way_in_names_the_same_taxels_and_gives_the_same_forces() {
         let results = streamed(&*engine, bytes(Box::new(Cursor::new(input.concat().into_bytes()))), &mut recorder);
         assert_eq!(results.len(), input.len());
         recorder.finish().unwrap();
-        let again =
-            || Paced::open(path("press"), FrameOptions::default(), Pace::Unbounded, [false, false]).unwrap();
+        let again = || Paced::open(path("press"), FrameOptions::default(), Pace::Unbounded, [false, false]).unwrap();
         let mut other = Recorder::create(&path("replayed"), &scene).unwrap();
         let replayed = streamed(&*engine, bytes(Box::new(Lines::of(again()))), &mut other);
         assert_eq!(replayed.len(), input.len());

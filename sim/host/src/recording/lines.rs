@@ -178,7 +178,8 @@ impl Lines {
             frame
         });
         // NaN, a missing reading, is written as null.
-        let line = frame.map(|frame| format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})));
+        let line =
+            frame.map(|frame| format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})));
         let is_there = line.is_some();
         self.line = Cursor::new(line.unwrap_or_default().into_bytes());
         Ok(is_there)

@@ -204,6 +204,7 @@ impl Next {
 mod tests {
     use super::*;
     use dermis_golden::data::frame::Frame;
+    use dermis_golden::data::recording::RecordedFrame;
     use dermis_golden::data::text::Stated;
     use dermis_golden::engine::CheckPace;
     use dermis_golden::estimate::float::Golden;
@@ -221,11 +222,11 @@ mod tests {
     type Seen = Vec<(Vec<[f64; 3]>, u64)>;
 
     /// What streams of these inputs give together, and how each ends.
-    fn together(engine: &Golden, inputs: Vec<Box<dyn Read + Send>>) -> (Seen, Vec<Result<Counts>>) {
+    fn together(engine: &Golden, inputs: Vec<Input>) -> (Seen, Vec<Result<Counts>>) {
         let mut seen: Seen = vec![Default::default(); inputs.len()];
         let member = |input| Member {
             estimators: Estimators::only(engine, CheckPace::Never),
-            input: (Input::Bytes(input), "memory".to_owned()),
+            input: (input, "memory".to_owned()),
             options: OPTIONS,
             zero: ZeroRequest::default(),
         };
@@ -246,8 +247,70 @@ mod tests {
         frames.iter().map(line).collect()
     }
 
-    fn memory(text: String) -> Box<dyn Read + Send> {
-        Box::new(Cursor::new(text.into_bytes()))
+    fn memory(text: String) -> Input {
+        Input::Bytes(Box::new(Cursor::new(text.into_bytes())))
+    }
+
+    /// Frames that are due so many milliseconds from now.
+    fn due(frames: &[(u64, &Frame)], end: Option<IoError>) -> Input {
+        let begun = Instant::now();
+        let of = |(ms, frame): &(u64, &Frame)| {
+            let recorded = RecordedFrame { time_ns: *ms, shape: [8, 8], stress_MPa: frame.readings() };
+            Ok((begun + Duration::from_millis(*ms), recorded))
+        };
+        let all: Vec<_> = frames.iter().map(of).chain(end.map(Err)).collect();
+        Input::Frames(Box::new(all.into_iter()))
+    }
+
+    /// Frames in place of lines have the results of their lines, in their time, and end as lines do.
+    #[test]
+    fn frames_have_the_results_of_lines_once_they_are_due() {
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene));
+        let (begun, wanted) = (Instant::now(), together(&engine, vec![memory(lines(&frames[..2]))]).0.remove(0));
+        let later = due(&[(0, &frames[0]), (200, &frames[1])], None);
+        let failing = due(&[(0, &frames[0]), (0, &frames[1])], Some(IoError::other("is cut")));
+        let other = Frame { stress_MPa: vec![0.0; 63], ..frames[0].clone() };
+        let (seen, ends) = together(&engine, vec![later, failing, due(&[(0, &other)], None), due(&[], None)]);
+        assert!(begun.elapsed() >= Duration::from_millis(200));
+        assert_eq!(seen, [wanted.clone(), wanted, (vec![], 1), (vec![], 0)]);
+        assert_eq!(ends[1].as_ref().unwrap_err().to_string(), "memory: is cut");
+        assert!([0, 2, 3].iter().all(|own| ends[*own].is_ok()));
+    }
+
+    /// Of frames that are due while others are answered the latest are kept; no stop waits for one that is not due.
+    #[test]
+    fn frames_that_are_due_too_soon_are_dropped_and_a_stop_waits_for_none() {
+        const SOON: usize = 9;
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frame) = (Golden::new(&scene).unwrap(), &Frame::shipped(&scene)[0]);
+        let all = [vec![(0, frame); SOON], vec![(3_600_000, frame)]].concat();
+        let member = |input| Member {
+            estimators: Estimators::only(&engine, CheckPace::Never),
+            input: (input, "memory".to_owned()),
+            options: StreamOptions { policy: Policy::Latest, live: true, ..OPTIONS },
+            zero: ZeroRequest::default(),
+        };
+        let (mut lines, stop) = (Vec::new(), Stop::default());
+        // Frames of one stream become due while those of another one that came before them are answered.
+        let members = vec![member(due(&all, None)), member(due(&all, None))];
+        let ends = run_together(&stop, members, &mut |index, outcome| {
+            if let Outcome::Answer(answer) = outcome {
+                lines.push((index, answer.line, answer.dropped));
+            }
+            if (0..2).all(|index| lines.iter().any(|own| own.0 == index && own.1 == SOON as u64)) {
+                stop.now();
+            }
+            Ok(())
+        });
+        assert!(ends.iter().all(Result::is_ok));
+        for index in 0..2 {
+            let own: Vec<_> = lines.iter().filter(|own| own.0 == index).collect();
+            let last = own[own.len() - 1];
+            // Each frame is answered or dropped.
+            assert_eq!((last.1, last.2 + own.len() as u64), (SOON as u64, SOON as u64), "{lines:?}");
+            assert!(last.2 > 0, "{lines:?}");
+        }
     }
 
     /// Fails after its lines.
@@ -273,7 +336,7 @@ mod tests {
             memory(lines(&frames)),
             memory(lines(&frames[1..])),
             rubbish,
-            Box::new(failing),
+            Input::Bytes(Box::new(failing)),
             memory(String::new()),
         ];
         let (seen, ends) = together(&engine, inputs);
@@ -307,11 +370,11 @@ mod tests {
         let (engine, line) = (Golden::new(&scene).unwrap(), lines(&Frame::shipped(&scene)[..1]));
         let member = |input, queue, policy| Member {
             estimators: Estimators::only(&engine, CheckPace::Never),
-            input: (Input::Bytes(input), "memory".to_owned()),
+            input: (input, "memory".to_owned()),
             options: StreamOptions { queue, policy, live: true, ..OPTIONS },
             zero: ZeroRequest::default(),
         };
-        let flood: Box<dyn Read + Send> = Box::new(Flood(line.clone().into_bytes(), 0));
+        let flood = Input::Bytes(Box::new(Flood(line.clone().into_bytes(), 0)));
         // All lines of the other one wait at once, and as many of the flood, so that it does not matter when its reader has its turn.
         let others = member(memory(line.repeat(WANTED)), WANTED, Policy::All);
         let (mut order, stop) = (Vec::new(), Stop::default());
