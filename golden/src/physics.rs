@@ -7,6 +7,7 @@
 //! | [`forward`] | stress of any forces on the surface, frame by frame |
 //! | [`gauss`] | Gauss–Legendre quadrature |
 //! | [`matrices`] | Cz⁺, Ax, Ay of a subarray |
+//! | `panels` | products of a matrix with one vector after another |
 //! | `smooth` | the smooth terms of a baseline |
 //! | [`symmetry`] | the basis of parities, in which matrices are computed and stored |
 
@@ -16,5 +17,6 @@ pub mod forward;
 pub mod gauss;
 pub mod influence;
 pub mod matrices;
+pub(crate) mod panels;
 pub(crate) mod smooth;
 pub mod symmetry;

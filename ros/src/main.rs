@@ -9,7 +9,7 @@
 //! | module | does |
 //! |---|---|
 //! | `patches` | the file that lists the patches |
-//! | `source` | lines of a patch, from a source that is opened again when it fails |
+//! | `source` | lines or frames of a patch, from a source that is opened again when it fails |
 //! | `topics` | names, types and qualities of the topics |
 //! | `carrier` | Zenoh or DDS, with the names that the middlewares of ROS 2 have |
 //! | `engines` | what computes the forces of each patch |

@@ -21,7 +21,7 @@ use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
 use crate::engines::{Engines, PatchEngine};
 use crate::messages::{self, Messages};
 use crate::patches::{CarrierName, NodeFields, Patch, PatchFile};
-use crate::source::Reopened;
+use crate::source;
 use crate::topics::{self, PatchTopics};
 
 /// Joins the network of ROS 2 as the node of these fields.
@@ -200,8 +200,7 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a WorkerPatch<'a>], share: f
             None => Faster::of_stream(&patch.scene, patch.engine, None),
         };
         let estimators = Estimators::new(engine, faster, pace, None, Clock::default()).with_share(share);
-        let source = Reopened::new(patch, Arc::clone(&member.outlet.state));
-        let input = (Box::new(source) as Box<dyn std::io::Read + Send>, patch.fields.source.clone());
+        let input = (source::input(patch, Arc::clone(&member.outlet.state)), patch.fields.source.clone());
         Member { estimators, input, options, zero: member.outlet.zero.clone() }
     };
     let members: Vec<Member> = all.iter().map(member).collect();

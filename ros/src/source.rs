@@ -1,4 +1,4 @@
-//! The lines of a patch: a source that is opened again when it fails or ends, with a word each time.
+//! The lines or frames of a patch: a source that is opened again when it fails or ends, with a word each time.
 //!
 //! | source | at its end | where it fails |
 //! |---|---|---|
@@ -14,8 +14,8 @@ use std::time::Duration;
 use dermis_flow::say;
 use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::spec::board::Board;
-use dermis_host::recording::{Lines, Pace};
-use dermis_host::stream::Source;
+use dermis_host::recording::{Pace, Paced};
+use dermis_host::stream::{DueFrame, Input, Source};
 
 use crate::diagnostics::PatchState;
 use crate::patches::{Origin, Patch};
@@ -25,13 +25,42 @@ const RETRY: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(16)];
 /// Put behind a line that a failure has cut, so that a number that was cut is not taken for another one.
 const CUT: &[u8] = b" cut off\n";
 
-/// The source of a patch, whose bytes go on when it fails.
-pub struct Reopened {
+/// What a patch reads; `state` says how its source is.
+pub fn input(patch: &Patch, state: Arc<PatchState>) -> Input {
+    match &patch.origin {
+        Origin::Lines(source) => Input::Bytes(Box::new(Reopened::new(patch, source.clone(), state))),
+        Origin::Recording(path) => Input::Frames(Box::new(recorded(patch, path, state))),
+    }
+}
+
+/// The frames of a recording.
+fn recorded(patch: &Patch, path: &Path, state: Arc<PatchState>) -> impl Iterator<Item = Result<DueFrame>> + Send {
+    let shape = Some([patch.scene.sensor.rows, patch.scene.sensor.cols]);
+    let options = FrameOptions { shape, ..FrameOptions::default() };
+    let opened = Paced::open(path.to_owned(), options, Pace::Recorded, [patch.fields.repeat, true]);
+    let mut frames: Box<dyn Iterator<Item = Result<DueFrame>> + Send> = match opened {
+        Ok(frames) => {
+            state.source(Ok(()));
+            Box::new(frames)
+        }
+        // Who reads the frames names the source.
+        Err(error) => Box::new(std::iter::once(Err(Error::other(error)))),
+    };
+    std::iter::from_fn(move || {
+        let next = frames.next();
+        match &next {
+            None => state.ended(None),
+            Some(Ok(_)) => (),
+            Some(Err(error)) => state.ended(Some(error.to_string())),
+        }
+        next
+    })
+}
+
+/// A source of lines, whose bytes go on when it fails.
+struct Reopened {
     name: String,
-    origin: Origin,
-    /// Rows and columns of a recording's frames.
-    shape: [usize; 2],
-    repeat: bool,
+    source: Source,
     baud: Option<u32>,
     state: Arc<PatchState>,
     open: Option<Box<dyn Read + Send>>,
@@ -44,13 +73,11 @@ pub struct Reopened {
 
 impl Reopened {
     /// The source of a patch, which is opened when it is first read; `state` says how it is.
-    pub fn new(patch: &Patch, state: Arc<PatchState>) -> Reopened {
+    fn new(patch: &Patch, source: Source, state: Arc<PatchState>) -> Reopened {
         let board = || Board::load(patch.scene.hardware.board_name()).ok()?.uart_baud;
         Reopened {
             name: patch.fields.name.clone(),
-            origin: patch.origin.clone(),
-            shape: [patch.scene.sensor.rows, patch.scene.sensor.cols],
-            repeat: patch.fields.repeat,
+            source,
             baud: patch.fields.baud.or_else(board),
             state,
             open: None,
@@ -60,25 +87,9 @@ impl Reopened {
         }
     }
 
-    fn opened(&self) -> Result<Box<dyn Read + Send>> {
-        match &self.origin {
-            Origin::Lines(source) => source.open(self.baud).map(|(input, _)| input),
-            Origin::Recording(path) => self.recording(path),
-        }
-    }
-
-    fn recording(&self, path: &Path) -> Result<Box<dyn Read + Send>> {
-        let options = FrameOptions { shape: Some(self.shape), ..FrameOptions::default() };
-        match Lines::open(path.to_owned(), options, Pace::Recorded, [self.repeat, true]) {
-            Ok(lines) => Ok(Box::new(lines)),
-            // Who reads the lines names the source.
-            Err(error) => Err(Error::other(error.to_string())),
-        }
-    }
-
     /// Whether it is opened again.
     fn goes_on(&self) -> bool {
-        matches!(self.origin, Origin::Lines(Source::Udp(_) | Source::Path(_)))
+        matches!(self.source, Source::Udp(_) | Source::Path(_))
     }
 
     /// Says what ended it; waits where that was a failure, so that one that never opens takes no time.
@@ -103,8 +114,8 @@ impl Reopened {
                 return self.rest.read(buffer);
             }
             let Some(open) = &mut self.open else {
-                match self.opened() {
-                    Ok(input) => {
+                match self.source.open(self.baud) {
+                    Ok((input, _)) => {
                         self.open = Some(input);
                         self.state.source(Ok(()));
                     }
@@ -155,9 +166,14 @@ mod tests {
         PatchFile::parse(&text, Path::new("")).unwrap().patches.remove(0)
     }
 
-    fn reopened(source: &str) -> Reopened {
+    fn opened(source: &str) -> Input {
         let state = PatchState::new(0, "a", "b", Duration::from_secs(1), Arc::new(Changes::default()));
-        Reopened::new(&patch(source), Arc::new(state))
+        input(&patch(source), Arc::new(state))
+    }
+
+    fn reopened(source: &str) -> Box<dyn Read + Send> {
+        let Input::Bytes(lines) = opened(source) else { panic!("{source} is a recording") };
+        lines
     }
 
     /// A line that its writer did not end is not taken for a whole one, and what the next writer sends is read.
@@ -208,7 +224,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("press.mcap");
         std::fs::write(&path, "no recording").unwrap();
-        let error = reopened(&path.display().to_string()).read(&mut [0; 8]).unwrap_err().to_string();
-        assert_eq!(error, "is no MCAP file");
+        let Input::Frames(mut frames) = opened(&path.display().to_string()) else { panic!("not a recording") };
+        assert_eq!(frames.next().unwrap().unwrap_err().to_string(), "is no MCAP file");
+        assert!(frames.next().is_none());
     }
 }

@@ -14,7 +14,8 @@
 //! | `window` | the taxels that are read |
 //! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
 //! | `network` | layers with the mirror symmetry |
-//! | `first_layer` | the first one behind the features, for one frame |
+//! | `first_layer` | the first one behind the features |
+//! | `forward` | all layers behind the features, for one frame |
 //! | `signature` | what it is trained for: a sensor, or a range of them |
 //! | `options`, `frames`, `inputs`, `training`, `adam` | drawn frames, loss, steps |
 //! | `file` | bytes |
@@ -35,6 +36,7 @@ mod error;
 mod features;
 mod file;
 mod first_layer;
+mod forward;
 mod frames;
 mod inputs;
 mod network;
@@ -63,7 +65,8 @@ use crate::spec::sensor::Sensor;
 use faer::Mat;
 use features::{power_above, Features, Readings};
 use first_layer::FirstLayer;
-use network::Network;
+use forward::Forward;
+use network::{Network, Parities};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -93,6 +96,8 @@ pub struct Learned {
     network: Network,
     /// Its first layer behind the features.
     first: FirstLayer,
+    /// Both for one frame.
+    forward: Forward,
 }
 
 /// μ from the network, as a normal density.
@@ -226,7 +231,8 @@ impl Learned {
         }
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         let first = FirstLayer::new(&features, &network.layers[0]);
-        Ok(Learned { signature, sensor: scene.sensor.clone(), medium: scene.medium, features, network, first })
+        let forward = Forward::new(&first, &network.layers[1..]);
+        Ok(Learned { signature, sensor: scene.sensor.clone(), medium: scene.medium, features, network, first, forward })
     }
 
     /// What the network was trained for.
@@ -262,7 +268,7 @@ impl Learned {
         let scale = power_above(b.norm_max()).recip();
         let stress = self.features.in_parities(&b, &|_| scale);
         let mask = (masked.norm_max() > 0.0).then(|| self.features.in_parities(&masked, &|_| 1.0));
-        self.in_scene(self.network.shear_behind(self.first.apply(&stress, mask.as_ref()))[0])
+        self.in_scene(self.forward.shear(first_frame(&stress), mask.as_ref().map(first_frame)))
     }
 
     /// Mean and standard deviation in units of mu_max as those of a μ of at most mu_max.
@@ -275,6 +281,11 @@ impl Learned {
         }
         found
     }
+}
+
+/// The values of the first frame.
+fn first_frame(of: &Parities) -> [&[f32]; 4] {
+    of.each_ref().map(|own| own.col_as_slice(0))
 }
 
 /// The bytes of the network that a scene names, and the name for errors.

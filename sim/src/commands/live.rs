@@ -1,6 +1,5 @@
 //! `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger that the mouse moves.
 
-use std::io::Read;
 use std::net::{SocketAddr, TcpListener};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -22,8 +21,10 @@ use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
 use dermis_host::engine::EngineName;
 use dermis_host::link::{open_board, BoardEngine, Session};
-use dermis_host::recording::{Lines, Pace};
-use dermis_host::stream::{run as run_stream, Clock, Estimators, Faster, Outcome, Policy, Source, StreamOptions};
+use dermis_host::recording::{Pace, Paced};
+use dermis_host::stream::{
+    run as run_stream, Clock, Estimators, Faster, Input, Outcome, Policy, Source, StreamOptions,
+};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]
@@ -91,16 +92,16 @@ impl Arguments {
         self.stream.is_none() && self.recording.is_none()
     }
 
-    /// The lines of frames and their source's name; `None` with the finger.
-    fn input(&self, scene: &Scene) -> Result<Option<(Box<dyn Read + Send>, String)>> {
+    /// The frames and their source's name; `None` with the finger.
+    fn input(&self, scene: &Scene) -> Result<Option<(Input, String)>> {
         match (&self.stream, &self.recording) {
-            (Some(source), _) => open(source, scene, self.baud).map(Some),
+            (Some(source), _) => open(source, scene, self.baud).map(|(lines, name)| Some((lines.into(), name))),
             (None, Some(path)) => {
                 let (name, shape) = (path.display().to_string(), Some([scene.sensor.rows, scene.sensor.cols]));
                 let options = FrameOptions { shape, ..FrameOptions::default() };
-                let lines = Lines::open(path.clone(), options, Pace::Recorded, [self.repeat, false]);
-                let lines = lines.map_err(|error| anyhow!("--recording {name}: {error}"))?;
-                Ok(Some((Box::new(lines), name)))
+                let frames = Paced::open(path.clone(), options, Pace::Recorded, [self.repeat, false]);
+                let frames = frames.map_err(|error| anyhow!("--recording {name}: {error}"))?;
+                Ok(Some((Input::Frames(Box::new(frames)), name)))
             }
             (None, None) => Ok(None),
         }

@@ -10,7 +10,7 @@ use dermis_golden::data::recording::message::Text;
 use dermis_golden::data::recording::{End, FrameOptions, Messages};
 
 use dermis_flow::output::write;
-use dermis_host::recording::{Lines, Pace, RESULT};
+use dermis_host::recording::{Lines, Pace, Paced, RESULT};
 
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 16;
@@ -71,8 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         true => write_results(file, &mut write)?,
         false => {
             let options = FrameOptions { shape: None, topic: topic.clone(), MPa_per_count: *mpa_per_count };
-            let lines = Lines::open(file.clone(), options, pace, [false, true]).map_err(|error| named(&error))?;
-            write_frames(lines, file, &mut write)?
+            let frames = Paced::open(file.clone(), options, pace, [false, true]).map_err(|error| named(&error))?;
+            write_frames(Lines::of(frames), file, &mut write)?
         }
     };
     match end.words() {

@@ -13,8 +13,8 @@ use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
-use dermis_host::recording::{Lines, Pace, Recorder};
-use dermis_host::stream::{run, Estimators, Outcome, Policy, StreamOptions};
+use dermis_host::recording::{Lines, Pace, Paced, Recorder};
+use dermis_host::stream::{run, Estimators, Input, Outcome, Policy, StreamOptions};
 
 /// Missing taxels of eight-by-eight, [row, col].
 const MISSING: [[usize; 2]; 3] = [[3, 3], [3, 4], [6, 2]];
@@ -83,7 +83,7 @@ fn lines(stress: &[f64]) -> Vec<String> {
 }
 
 /// The results of a stream, all but the frame's name; and the recording of it.
-fn streamed(engine: &dyn Engine, input: Box<dyn Read + Send>, recorder: &mut Recorder) -> Vec<Reconstruction> {
+fn streamed(engine: &dyn Engine, input: Input, recorder: &mut Recorder) -> Vec<Reconstruction> {
     let (options, mut all) =
         (StreamOptions { queue: 4, policy: Policy::All, live: false, layout: Stated::default() }, Vec::new());
     let mut output = |outcome: &Outcome| match outcome {
@@ -127,13 +127,17 @@ fn every_way_in_names_the_same_taxels_and_gives_the_same_forces() {
         let path = |name: &str| folder.path().join(format!("{}-{name}.mcap", exact.engine));
         let mut recorder = Recorder::create(&path("press"), &scene).unwrap();
         let input = lines(&stress);
-        let results = streamed(&*engine, Box::new(Cursor::new(input.concat().into_bytes())), &mut recorder);
+        let bytes = |bytes: Box<dyn Read + Send>| Input::Bytes(bytes);
+        let results = streamed(&*engine, bytes(Box::new(Cursor::new(input.concat().into_bytes()))), &mut recorder);
         assert_eq!(results.len(), input.len());
         recorder.finish().unwrap();
-        let again = Lines::open(path("press"), FrameOptions::default(), Pace::Unbounded, [false, false]).unwrap();
+        let again = || Paced::open(path("press"), FrameOptions::default(), Pace::Unbounded, [false, false]).unwrap();
         let mut other = Recorder::create(&path("replayed"), &scene).unwrap();
-        let replayed = streamed(&*engine, Box::new(again), &mut other);
+        let replayed = streamed(&*engine, bytes(Box::new(Lines::of(again()))), &mut other);
         assert_eq!(replayed.len(), input.len());
+        // Values are the same as their lines.
+        let mut values = Recorder::create(&path("values"), &scene).unwrap();
+        assert_eq!(streamed(&*engine, Input::Frames(Box::new(again())), &mut values), replayed);
         // A frame of a stream goes on from the one before it.
         let mut state = State::default();
         let frame = Frame::from_stress("numbers", &scene.sensor, stress.clone()).unwrap();

@@ -2,9 +2,9 @@
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: parities of b/s, s the power of two above max \|b\| | quads × frames | – |
-//! | in: parities of the mask | quads × frames | – |
-//! | out: outputs of each parity before ReLU | outputs × frames | – |
+//! | in: weights of the inputs, of each parity | outputs × 4Q | – |
+//! | out: weights of b/s, s the power of two above max \|b\| | outputs × Q | – |
+//! | out: weights of the mask | outputs × Q | – |
 
 use super::features::{Features, AMPLITUDE};
 use super::network::{Layer, Parities};
@@ -23,15 +23,6 @@ impl FirstLayer {
     pub fn new(features: &Features, layer: &Layer) -> FirstLayer {
         let stress = Layer { weights: features.composed(&layer.weights), ..layer.clone() };
         FirstLayer { stress, mask: features.of_mask(&layer.weights) }
-    }
-
-    /// Its outputs before ReLU; without `mask` no taxel is masked.
-    pub fn apply(&self, stress: &Parities, mask: Option<&Parities>) -> Parities {
-        let mut outputs = self.stress.apply(stress);
-        for (outputs, (own, mask)) in outputs.iter_mut().zip(self.mask.iter().zip(mask.into_iter().flatten())) {
-            *outputs += own * mask;
-        }
-        outputs
     }
 }
 

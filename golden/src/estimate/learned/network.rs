@@ -35,22 +35,35 @@ pub(super) type Parities = [Mat<f32>; 4];
 
 /// Mirror images from parities, and back: half their Hadamard transform.
 pub(super) fn exchanged(mut of: Parities) -> Parities {
-    by_columns(&mut of, |a, b, c, d| {
-        for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
-            [*a, *b, *c, *d] = halved([*a, *b, *c, *d]);
-        }
-    });
+    by_columns(&mut of, exchange);
     of
+}
+
+/// The same of one frame.
+pub(super) fn exchange(a: &mut [f32], b: &mut [f32], c: &mut [f32], d: &mut [f32]) {
+    for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
+        [*a, *b, *c, *d] = halved([*a, *b, *c, *d]);
+    }
 }
 
 /// Mirror images after ReLU, from parities.
 fn rectified(mut of: Parities) -> Parities {
-    by_columns(&mut of, |a, b, c, d| {
-        for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
-            [*a, *b, *c, *d] = halved([*a, *b, *c, *d]).map(|image| image.max(0.0));
-        }
-    });
+    by_columns(&mut of, rectify);
     of
+}
+
+/// The same of one frame.
+pub(super) fn rectify(a: &mut [f32], b: &mut [f32], c: &mut [f32], d: &mut [f32]) {
+    for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
+        [*a, *b, *c, *d] = halved([*a, *b, *c, *d]).map(|image| image.max(0.0));
+    }
+}
+
+/// μ and σ in units of mu_max, [x, y], from the outputs of a frame.
+pub(super) fn density(outputs: [f32; OUTPUTS]) -> ([f64; 2], [f64; 2]) {
+    let [x, y, ln_x, ln_y] = outputs;
+    let sigma = |ln: f32| f64::from(ln.clamp(LN_SIGMA[0], LN_SIGMA[1])).exp();
+    ([x, y].map(f64::from), [ln_x, ln_y].map(sigma))
 }
 
 /// The slope in front of a ReLU, in parities, from that behind it; `images` are its outputs.
@@ -206,12 +219,7 @@ impl Network {
     pub fn shear_behind(&self, first: Parities) -> Vec<([f64; 2], [f64; 2])> {
         let last = self.layers[1..].iter().fold(first, |before, layer| layer.apply(&exchanged(rectified(before))));
         let last = Network::outputs(&last);
-        let sigma = |ln: f32| f64::from(ln.clamp(LN_SIGMA[0], LN_SIGMA[1])).exp();
-        let of = |frame: usize| {
-            let at = |k: usize| last[(k, frame)];
-            ([f64::from(at(0)), f64::from(at(1))], [sigma(at(2)), sigma(at(3))])
-        };
-        (0..last.ncols()).map(of).collect()
+        (0..last.ncols()).map(|frame| density(std::array::from_fn(|k| last[(k, frame)]))).collect()
     }
 
     /// Channels of the inputs and of every layer.

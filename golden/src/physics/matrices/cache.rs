@@ -86,7 +86,7 @@ impl CacheFile {
         cached.numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
         for operator in &cached.operators {
             size(&mut bytes, operator.blocks.len());
-            for Block { row0, col0, entries } in &operator.blocks {
+            for Block { row0, col0, entries, .. } in &operator.blocks {
                 [*row0, *col0, entries.nrows(), entries.ncols()].into_iter().for_each(|n| size(&mut bytes, n));
                 entries.col_iter().for_each(|col| col.iter().for_each(|c| bytes.extend(c.to_le_bytes())));
             }
@@ -126,7 +126,7 @@ impl<'a> Reader<'a> {
             let [row0, col0, rows, cols] = [self.size()?, self.size()?, self.size()?, self.size()?];
             let bytes = self.take(rows.checked_mul(cols)?.checked_mul(8)?)?;
             let at = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| bytes[8 * k + byte]));
-            Some(Block { row0, col0, entries: Mat::from_fn(rows, cols, |i, j| at(j * rows + i)) })
+            Some(Block::new(row0, col0, Mat::from_fn(rows, cols, |i, j| at(j * rows + i))))
         };
         Some(Operator { blocks: (0..count).map(block).collect::<Option<_>>()? })
     }
@@ -143,8 +143,8 @@ mod tests {
     fn cached() -> CachedMatrices {
         let operator = |by: f64| Operator {
             blocks: vec![
-                Block { row0: 0, col0: 2, entries: Mat::from_fn(2, 3, |i, j| by / (1 + i + 10 * j) as f64) },
-                Block { row0: 2, col0: 0, entries: Mat::from_fn(1, 2, |_, j| -by * j as f64) },
+                Block::new(0, 2, Mat::from_fn(2, 3, |i, j| by / (1 + i + 10 * j) as f64)),
+                Block::new(2, 0, Mat::from_fn(1, 2, |_, j| -by * j as f64)),
             ],
         };
         CachedMatrices {

@@ -25,11 +25,8 @@ pub(super) fn chain(a: &Operator, b: &Operator) -> Operator {
         let fits = |right: &&Block| right.row0 == left.col0 && right.entries.nrows() == left.entries.ncols();
         b.blocks.iter().find(fits).map(|right| (left, right))
     });
-    let multiply = |(left, right): (&Block, &Block)| Block {
-        row0: left.row0,
-        col0: right.col0,
-        entries: product(&left.entries, &right.entries),
-    };
+    let multiply =
+        |(left, right): (&Block, &Block)| Block::new(left.row0, right.col0, product(&left.entries, &right.entries));
     Operator { blocks: pairs.map(multiply).collect() }
 }
 
@@ -75,8 +72,7 @@ impl Inverse {
             };
             let n = values.len();
             let scaled = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * factor(k));
-            let entries = product(&scaled, &vectors.transpose().to_owned());
-            Block { row0: *start, col0: *start, entries }
+            Block::new(*start, *start, product(&scaled, &vectors.transpose().to_owned()))
         };
         Operator { blocks: self.blocks.iter().map(power).collect() }
     }

@@ -19,6 +19,7 @@
 //! A matrix without the symmetry, such as one with dead taxels, is one block in the basis of the taxels.
 
 use super::parity::{has_entry, sign, FLIP_X, FLIP_Y};
+use crate::physics::panels::Panels;
 use crate::spec::quads::Quads;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColMut, ColRef, Mat, Par};
@@ -66,6 +67,16 @@ pub struct Block {
     pub col0: usize,
     /// The entries.
     pub entries: Mat<f64>,
+    /// The same for products with a vector.
+    panels: Panels<f64>,
+}
+
+impl Block {
+    /// A block of these entries, the first of which is in this row and column.
+    pub fn new(row0: usize, col0: usize, entries: Mat<f64>) -> Block {
+        let panels = Panels::new(entries.as_ref());
+        Block { row0, col0, entries, panels }
+    }
 }
 
 /// A matrix in a folded basis.
@@ -84,14 +95,14 @@ pub fn accumulate(m: &Mat<f64>, v: &[f64], factor: f64, out: &mut [f64]) {
 impl Operator {
     /// A matrix without mirror symmetry, in the basis of the taxels.
     pub fn dense(entries: Mat<f64>) -> Operator {
-        Operator { blocks: vec![Block { row0: 0, col0: 0, entries }] }
+        Operator { blocks: vec![Block::new(0, 0, entries)] }
     }
 
     /// `out += factor · M · v`, all in this basis.
     pub fn accumulate(&self, v: &[f64], factor: f64, out: &mut [f64]) {
-        for Block { row0, col0, entries } in &self.blocks {
+        for Block { row0, col0, entries, panels } in &self.blocks {
             let (v, out) = (&v[*col0..][..entries.ncols()], &mut out[*row0..][..entries.nrows()]);
-            accumulate(entries, v, factor, out);
+            panels.accumulate(v, factor, out);
         }
     }
 }
@@ -162,7 +173,7 @@ impl Basis {
                 let (first, _) = row.taxels[0];
                 (row.images / col.images).sqrt() * col.sum(|taxel| m(first, taxel))
             });
-            Block { row0: self.range(target).start, col0: self.range(target ^ flip).start, entries }
+            Block::new(self.range(target).start, self.range(target ^ flip).start, entries)
         };
         Operator { blocks: (0..4).map(block).collect() }
     }

@@ -29,7 +29,7 @@ const FEWEST_BESIDE: usize = 2;
 #[derive(Clone, Debug, Default)]
 struct Run {
     frames: usize,
-    /// Readings of the taxels beside it when it changed.
+    /// Readings of the taxels beside it when it changed; empty before it stands still, as taxels with noise never do.
     beside: Vec<f64>,
 }
 
@@ -40,7 +40,10 @@ pub struct History {
     beside: Vec<Vec<usize>>,
     alive: Vec<bool>,
     runs: Vec<Run>,
+    /// The last reading of each taxel.
     last: Vec<f64>,
+    /// The last frame, NaN where a reading is missing.
+    frame: Vec<f64>,
     /// Largest range of a frame.
     range: f64,
 }
@@ -66,7 +69,7 @@ impl History {
             }
         };
         let beside = (0..sensor.taxels()).map(beside).collect();
-        History { beside, alive, runs: Vec::new(), last: Vec::new(), range: 0.0 }
+        History { beside, alive, runs: Vec::new(), last: Vec::new(), frame: Vec::new(), range: 0.0 }
     }
 
     /// Adds the frames of one reconstruction: `checks` with their figures, the largest of each. Frames of another sensor are
@@ -93,7 +96,7 @@ impl History {
         let (mut constant_share, mut torn_share) = (None, None);
         let taxels = self.alive.len();
         for frame in frames.iter().filter(|frame| frame.stress_MPa.len() == taxels) {
-            let (constant, torn) = self.add_one(&frame.readings());
+            let (constant, torn) = self.add_one(frame.readings());
             constant_share = [constant_share, constant].into_iter().flatten().reduce(f64::max);
             torn_share = [torn_share, torn].into_iter().flatten().reduce(f64::max);
         }
@@ -101,7 +104,7 @@ impl History {
     }
 
     /// The constant share and the torn share; `None` before there is a frame to compare with, and for one of few steps.
-    fn add_one(&mut self, now: &[f64]) -> (Option<f64>, Option<f64>) {
+    fn add_one(&mut self, now: Vec<f64>) -> (Option<f64>, Option<f64>) {
         let live = || (0..now.len()).filter(|k| self.alive[*k] && !now[*k].is_nan());
         let of = |taxels: &mut dyn Iterator<Item = usize>| range(taxels.map(|k| now[k]));
         let (whole, fine) = (self.range.max(of(&mut live())), is_fine(live().map(|k| now[k])));
@@ -117,13 +120,16 @@ impl History {
         let beside = |taxel: usize| self.beside[taxel].iter().map(|k| now[*k]);
         let begun = !self.runs.is_empty();
         self.runs.resize(now.len(), Run::default());
-        for (taxel, run) in self.runs.iter_mut().enumerate().filter(|(taxel, _)| !begun || !now[*taxel].is_nan()) {
-            if begun && self.last[taxel] == now[taxel] {
-                run.frames += 1;
+        for (taxel, run) in self.runs.iter_mut().enumerate() {
+            let missing = now[taxel].is_nan();
+            if begun && (missing || self.last[taxel] == now[taxel]) {
+                if run.frames == 1 && run.beside.is_empty() {
+                    run.beside.extend(self.beside[taxel].iter().map(|k| self.frame[*k]));
+                }
+                run.frames += usize::from(!missing);
             } else {
                 run.frames = 1;
                 run.beside.clear();
-                run.beside.extend(beside(taxel));
             }
         }
         let still = |taxel: &usize| {
@@ -143,9 +149,9 @@ impl History {
         };
         let constant = fine.then(|| live().filter(still).map(least).fold(0.0, f64::max) / whole);
         // The last reading of each taxel, which may be older than the last frame.
-        let last =
-            (0..now.len()).map(|k| if now[k].is_nan() { *self.last.get(k).unwrap_or(&f64::NAN) } else { now[k] });
-        (self.last, self.range) = (last.collect(), whole);
+        self.last.resize(now.len(), f64::NAN);
+        std::iter::zip(&mut self.last, &now).filter(|(_, now)| !now.is_nan()).for_each(|(last, now)| *last = *now);
+        (self.frame, self.range) = (now, whole);
         (constant, torn)
     }
 }

@@ -37,17 +37,15 @@ const PRESSED: f64 = 0.8;
 pub fn pull_share(scene: &Scene, frame: &Frame) -> Option<f64> {
     let (rows, cols, b) = (frame.sensor.rows, frame.sensor.cols, &frame.stress_MPa);
     let alive = scene.input.alive(&frame.sensor);
-    let reading = |row: usize, col: usize| if alive[row * cols + col] { b[row * cols + col] } else { 0.0 };
-    let sum = |taxel: usize| {
-        let (row, col) = (taxel / cols, taxel % cols);
-        let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-        near(row, rows)
-            .flat_map(|row| near(col, cols).map(move |col| (row, col)))
-            .map(|(row, col)| reading(row, col))
-            .sum()
-    };
-    let sums: Vec<f64> = (0..rows * cols).map(sum).collect();
-    let (push, pull) = sums.iter().fold((0.0f64, 0.0f64), |(push, pull), sum| (push.max(*sum), pull.max(-sum)));
+    let read: Vec<f64> = std::iter::zip(b, &alive).map(|(b, alive)| if *alive { *b } else { 0.0 }).collect();
+    let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    let (mut push, mut pull) = (0.0f64, 0.0f64);
+    for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
+        let columns = near(col, cols);
+        let lines = near(row, rows).map(|row| &read[row * cols..][columns.clone()]);
+        let sum: f64 = lines.flatten().sum();
+        (push, pull) = (push.max(sum), pull.max(-sum));
+    }
     let stated = scene.search.noise_floor_MPa() * scene.input.noise_share();
     let is_pull = |noise: f64| pull > SIGNIFICANT * AROUND.sqrt() * noise;
     // What the readings show of the noise takes as long as the sums.

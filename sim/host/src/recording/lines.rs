@@ -1,12 +1,13 @@
-//! Recorded frames as lines of a stream, at a pace.
+//! Recorded frames at a pace, as values or as lines of a stream.
 
 use std::io::{Cursor, Error, Read};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dermis_golden::data::recording::{End, FrameOptions, Frames, RecordingError};
+use dermis_golden::data::recording::{End, FrameOptions, Frames, RecordedFrame, RecordingError};
 use serde_json::json;
+
+use crate::stream::DueFrame;
 
 /// When frames are handed out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,42 +20,44 @@ pub enum Pace {
     Recorded,
 }
 
-/// Most bytes of the lines of a file that is repeated, which are kept so that it is read and put into words once.
+/// Most bytes of the values of a file that is repeated, which are kept so that it is read once.
 const REPEATED_BYTES: usize = 4 << 20;
 
-/// When a frame was acquired, and its line.
-type TimedLine = (u64, Arc<[u8]>);
-
-/// The lines of a file that begins again.
+/// The frames of a file that begins again.
 #[derive(Default)]
-struct RepeatedLines {
-    lines: Vec<TimedLine>,
+struct Repeated {
+    frames: Vec<RecordedFrame>,
     bytes: usize,
-    /// Number of the next line, once all are there.
+    /// Number of the next frame, once all are there.
     next: Option<usize>,
 }
 
-impl RepeatedLines {
-    /// Keeps a line; whether there was room.
-    fn add(&mut self, time_ns: u64, line: &Arc<[u8]>) -> bool {
-        self.bytes += line.len();
+impl Repeated {
+    /// Keeps a frame; whether there was room.
+    fn add(&mut self, frame: &RecordedFrame) -> bool {
+        self.bytes += size_of_val(&frame.stress_MPa[..]);
         let fits = self.bytes <= REPEATED_BYTES;
         if fits {
-            self.lines.push((time_ns, Arc::clone(line)));
+            self.frames.push(frame.clone());
         }
         fits
     }
 }
 
-/// The frames of a file, read as lines that a stream takes; errors have no file's name.
-pub struct Lines {
+/// A moment that no program lives to see, of a frame whose own one is beyond the range of the clock.
+fn far_away() -> Instant {
+    Instant::now() + Duration::from_secs(u32::MAX.into())
+}
+
+/// The frames of a file, each with the moment at which it is due by their pace; errors have no file's name.
+pub struct Paced {
     path: PathBuf,
     options: FrameOptions,
     pace: Pace,
     /// Begin again at the end.
     repeat: bool,
-    /// The lines so far of a file that begins again and is not too long.
-    repeated: Option<RepeatedLines>,
+    /// The frames so far of a file that begins again and is not too long.
+    repeated: Option<Repeated>,
     /// Take a file that is cut like one that ends.
     partial: bool,
     frames: Frames,
@@ -65,10 +68,9 @@ pub struct Lines {
     /// When the last frame was due since then, and how long after the one before.
     due: Duration,
     gap: Duration,
-    line: Cursor<Arc<[u8]>>,
 }
 
-impl Lines {
+impl Paced {
     /// Opens a file; with `repeat` it begins again at its end. One that is cut ends with an error, unless it may be `partial`.
     ///
     /// # Errors
@@ -78,49 +80,46 @@ impl Lines {
         options: FrameOptions,
         pace: Pace,
         [repeat, partial]: [bool; 2],
-    ) -> Result<Lines, RecordingError> {
+    ) -> Result<Paced, RecordingError> {
         let frames = Frames::open(&path, options.clone())?;
-        let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Cursor::default());
-        let repeated = repeat.then(RepeatedLines::default);
-        Ok(Lines { path, options, pace, repeat, repeated, partial, frames, begun: None, count: 0, due, gap, line })
+        let (due, gap) = (Duration::ZERO, Duration::ZERO);
+        let repeated = repeat.then(Repeated::default);
+        Ok(Paced { path, options, pace, repeat, repeated, partial, frames, begun: None, count: 0, due, gap })
     }
 
-    /// How the file ends, once there is no further line.
+    /// How the file ends, once there is no further frame.
     pub fn end(&self) -> End {
         self.frames.end()
     }
 
-    /// The next line of the file.
-    fn read_next(&mut self) -> Result<Option<TimedLine>, RecordingError> {
+    /// The next frame of the file.
+    fn read_next(&mut self) -> Result<Option<RecordedFrame>, RecordingError> {
         let next = self.frames.next_frame()?;
         if let (End::Cut, Some(words), false) = (self.end(), self.end().words(), self.partial) {
             return Err(RecordingError::new(words));
         }
-        let Some(frame) = next else { return Ok(None) };
-        // NaN, a missing reading, is written as null.
-        let line = format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa}));
-        let line: Arc<[u8]> = line.into_bytes().into();
-        self.repeated =
-            self.repeated.take().and_then(|mut repeated| repeated.add(frame.time_ns, &line).then_some(repeated));
-        Ok(Some((frame.time_ns, line)))
+        if let Some(frame) = &next {
+            self.repeated = self.repeated.take().and_then(|mut all| all.add(frame).then_some(all));
+        }
+        Ok(next)
     }
 
-    /// The same of the lines that are kept, once all are: they begin again.
-    fn next_kept(&mut self) -> Option<TimedLine> {
-        let RepeatedLines { lines, next, .. } = self.repeated.as_mut()?;
+    /// The same of the frames that are kept, once all are: they begin again.
+    fn next_kept(&mut self) -> Option<RecordedFrame> {
+        let Repeated { frames, next, .. } = self.repeated.as_mut()?;
         let number = next.as_mut()?;
-        let line = lines.get(*number).cloned();
+        let frame = frames.get(*number).cloned();
         *number += 1;
-        line
+        frame
     }
 
-    /// Takes the next line, once it is due; returns whether there is one.
-    fn advance(&mut self) -> Result<bool, RecordingError> {
+    /// The next frame, and when it is due; `None` at the end.
+    fn advance(&mut self) -> Result<Option<DueFrame>, RecordingError> {
         let all_kept = self.repeated.as_ref().is_some_and(|repeated| repeated.next.is_some());
         let mut next = if all_kept { self.next_kept() } else { self.read_next()? };
         if next.is_none() && self.repeat {
             (self.begun, self.count, self.due) = (None, 0, Duration::ZERO);
-            next = match self.repeated.as_mut().filter(|repeated| !repeated.lines.is_empty()) {
+            next = match self.repeated.as_mut().filter(|repeated| !repeated.frames.is_empty()) {
                 Some(repeated) => {
                     repeated.next = Some(0);
                     self.next_kept()
@@ -131,30 +130,66 @@ impl Lines {
                 }
             };
         }
-        let Some((time_ns, line)) = next else { return Ok(false) };
+        let Some(frame) = next else { return Ok(None) };
         // From the last frame to the first one as long as from the last but one to the last.
-        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, time_ns));
+        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, frame.time_ns));
         let due = match self.pace {
             Pace::Unbounded => Duration::ZERO,
             Pace::Rate(rate) => Duration::try_from_secs_f64(self.count as f64 / rate).unwrap_or(Duration::MAX),
-            Pace::Recorded => Duration::from_nanos(time_ns.saturating_sub(first)),
+            Pace::Recorded => Duration::from_nanos(frame.time_ns.saturating_sub(first)),
         };
-        let wait = begun.checked_add(due).map_or(due, |at| at.saturating_duration_since(Instant::now()));
-        std::thread::sleep(wait);
         // Times may go back.
         (self.gap, self.due) = (due.saturating_sub(self.due), due);
         self.count += 1;
-        self.line = Cursor::new(line);
-        Ok(true)
+        Ok(Some((begun.checked_add(due).unwrap_or_else(far_away), frame)))
+    }
+}
+
+impl Iterator for Paced {
+    type Item = std::io::Result<DueFrame>;
+
+    /// The next frame, and when it is due; an error of a file that is no recording, was changed or is cut.
+    fn next(&mut self) -> Option<Self::Item> {
+        self.advance().map_err(Error::other).transpose()
+    }
+}
+
+/// The frames of a file, read as lines that a stream takes.
+pub struct Lines {
+    frames: Paced,
+    line: Cursor<Vec<u8>>,
+}
+
+impl Lines {
+    /// The lines of these frames.
+    pub fn of(frames: Paced) -> Lines {
+        Lines { frames, line: Cursor::default() }
+    }
+
+    /// How the file ends, once there is no further line.
+    pub fn end(&self) -> End {
+        self.frames.end()
+    }
+
+    /// Takes the next line, once it is due; returns whether there is one.
+    fn advance(&mut self) -> std::io::Result<bool> {
+        let frame = self.frames.next().transpose()?.map(|(due, frame)| {
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            frame
+        });
+        // NaN, a missing reading, is written as null.
+        let line =
+            frame.map(|frame| format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})));
+        let is_there = line.is_some();
+        self.line = Cursor::new(line.unwrap_or_default().into_bytes());
+        Ok(is_there)
     }
 }
 
 impl Read for Lines {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         match self.line.read(buffer)? {
-            0 if !buffer.is_empty() && self.advance().map_err(|error| Error::other(error.to_string()))? => {
-                self.line.read(buffer)
-            }
+            0 if !buffer.is_empty() && self.advance()? => self.line.read(buffer),
             bytes => Ok(bytes),
         }
     }
@@ -199,9 +234,10 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_kept_while_there_is_room() {
-        let (mut repeated, line) = (RepeatedLines::default(), Arc::from(vec![b'1'; REPEATED_BYTES / 2]));
-        assert!(repeated.add(1, &line) && repeated.add(2, &line) && !repeated.add(3, &Arc::from(*b"1")));
+    fn frames_are_kept_while_there_is_room() {
+        let frame = |bytes: usize| RecordedFrame { time_ns: 1, shape: [1, 1], stress_MPa: vec![0.0; bytes / 8] };
+        let (mut repeated, half) = (Repeated::default(), frame(REPEATED_BYTES / 2));
+        assert!(repeated.add(&half) && repeated.add(&half) && !repeated.add(&frame(8)));
     }
 
     #[test]
@@ -213,7 +249,8 @@ mod tests {
         let options = || FrameOptions { shape: Some([8, 8]), ..FrameOptions::default() };
         let read = |pace, repeat, count: usize| {
             let begun = Instant::now();
-            let lines = BufReader::new(Lines::open(path.clone(), options(), pace, [repeat, false]).unwrap()).lines();
+            let frames = Paced::open(path.clone(), options(), pace, [repeat, false]).unwrap();
+            let lines = BufReader::new(Lines::of(frames)).lines();
             let lines: Vec<String> = lines.take(count).map(Result::unwrap).collect();
             assert!(lines.iter().zip(recorded.iter().cycle()).all(|(own, line)| own == line));
             (lines.len(), begun.elapsed().as_secs_f64())
@@ -231,16 +268,16 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
         for repeat in [false, true] {
-            let lines = Lines::open(path.clone(), options(), Pace::Unbounded, [repeat, false]).unwrap();
-            let lines: Vec<_> = BufReader::new(lines).lines().take(4).collect();
+            let frames = Paced::open(path.clone(), options(), Pace::Unbounded, [repeat, false]).unwrap();
+            let lines: Vec<_> = BufReader::new(Lines::of(frames)).lines().take(4).collect();
             assert!(lines.len() == 4 && lines[..3].iter().all(|line| line.is_ok()));
             assert!(lines[3].as_ref().unwrap_err().to_string().starts_with("ends early"));
         }
         // A file without frames is no endless loop.
         let empty = folder.path().join("empty.mcap");
         Recorder::create(&empty, &Scene::builtin("eight-by-eight").unwrap()).unwrap().finish().unwrap();
-        let mut lines = Lines::open(empty, FrameOptions::default(), Pace::Unbounded, [true, false]).unwrap();
-        let error = lines.read(&mut [0; 8]).unwrap_err().to_string();
+        let frames = Paced::open(empty, FrameOptions::default(), Pace::Unbounded, [true, false]).unwrap();
+        let error = Lines::of(frames).read(&mut [0; 8]).unwrap_err().to_string();
         assert!(
             error.starts_with("has no message of channel /dermis/stress; its channels: /dermis/stress_exact ("),
             "{error}"

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`arrows`] | the forces of a result as arrows that viewers draw |
 //! | [`points`] | the taxels of a result as points with their forces |
-//! | [`lines`] | recorded frames as lines of a stream, at a pace |
+//! | [`lines`] | recorded frames at a pace, as values or as lines of a stream |
 //! | [`mod@write`] | outcomes of a stream into a file |
 
 pub mod arrows;
@@ -16,7 +16,7 @@ pub mod points;
 pub mod write;
 
 pub use arrows::Arrows;
-pub use lines::{Lines, Pace};
+pub use lines::{Lines, Pace, Paced};
 pub use points::Points;
 pub use write::Recorder;
 

@@ -15,7 +15,7 @@ use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
 use super::line::{self, Brought, LineFrame};
 use super::queue::Policy;
-use super::reader::ReceivedLine;
+use super::reader::{Content, ReceivedLine};
 use super::zero::{ZeroRequest, Zeros, ZERO_FRAMES};
 use crate::engine::typed;
 
@@ -217,13 +217,14 @@ impl<'a> Stream<'a> {
 
     /// Hands on what a line gave, it or lines before that waited; nothing for a frame that does not complete its block. `full` lines so
     /// far found the queue full.
-    pub(super) fn answer(&mut self, received: &ReceivedLine, full: u64, output: &mut Output) -> std::io::Result<()> {
-        let ReceivedLine { number: line, time, at, .. } = *received;
+    pub(super) fn answer(&mut self, received: ReceivedLine, full: u64, output: &mut Output) -> std::io::Result<()> {
+        let ReceivedLine { number: line, time, at, content } = received;
         self.read.push_back(Stamp { line, time, at });
-        let brought = match &received.bytes {
-            Ok(bytes) if self.read.len() <= MOST_WAITING => self.frames.push(bytes, line),
-            Ok(bytes) => [self.frames.settle(), self.frames.push(bytes, line)].concat(),
-            Err(reason) => self.frames.refuse(line, reason.clone()),
+        let brought = match content {
+            Content::Line(bytes) if self.read.len() <= MOST_WAITING => self.frames.push(&bytes, line),
+            Content::Line(bytes) => [self.frames.settle(), self.frames.push(&bytes, line)].concat(),
+            Content::Frame(frame) => self.frames.push_values(frame, line),
+            Content::None(reason) => self.frames.refuse(line, reason),
         };
         self.hand_on(brought, full, output)
     }
@@ -587,7 +588,8 @@ mod tests {
         let run = || {
             let engine = engine_of(&scene, EngineName::Golden);
             let estimators = Estimators::only(&*engine, CheckPace::Never);
-            run_until(&stop, estimators, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
+            let endless: Box<dyn Read + Send> = Box::new(Endless);
+            run_until(&stop, estimators, (endless, "memory"), ALL, &mut |_| Ok(()))
         };
         std::thread::scope(|scope| {
             let running = scope.spawn(run);

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::io::{self, BufRead, Read as _};
 
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::recording::RecordedFrame;
 use dermis_golden::data::text::{decoded, Form, Layout, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::sensor::Sensor;
@@ -127,6 +128,18 @@ impl Frames {
         self.brought(read, number)
     }
 
+    /// The same of a frame whose values are known, in place of a line of this number.
+    pub fn push_values(&mut self, frame: RecordedFrame, number: u64) -> Vec<Brought> {
+        let mut brought = self.settle();
+        let RecordedFrame { time_ns, stress_MPa, .. } = frame;
+        let own = self.checked(Value::Null, number, stress_MPa).map(|(id, frame)| {
+            // Beyond the times that a frame may have it has none.
+            LineFrame { id, frame: Frame { time_ns: i64::try_from(time_ns).ok(), ..frame }, doubtful: false }
+        });
+        brought.push((number, own));
+        brought
+    }
+
     /// A piece that is no line, for this reason: what those before it bring that wait, then its refusal.
     pub fn refuse(&mut self, number: u64, reason: String) -> Vec<Brought> {
         let mut brought = self.settle();
@@ -186,16 +199,19 @@ impl Frames {
 
     fn frame(&self, frame: TextFrame) -> Result<LineFrame, NoFrame> {
         let TextFrame { id, readings, time_ns, resultant_N, line, doubt, .. } = frame;
+        let (id, frame) = self.checked(id, line as u64, readings)?;
+        Ok(LineFrame { id, frame: Frame { resultant_N, time_ns, ..frame }, doubtful: doubt.is_some() })
+    }
+
+    /// The frame of these readings, with the name that its id, or without one the number of its line gives it.
+    fn checked(&self, id: Value, line: u64, readings: Vec<f64>) -> Result<(Value, Frame), NoFrame> {
         let name = match &id {
             Value::Null => format!("line {line}"),
             Value::String(name) => name.clone(),
             other => other.to_string(),
         };
         match Frame::from_stress(&name, &self.sensor, readings) {
-            Ok(frame) => {
-                let frame = Frame { resultant_N, time_ns, ..frame };
-                Ok(LineFrame { id, frame, doubtful: doubt.is_some() })
-            }
+            Ok(frame) => Ok((id, frame)),
             Err(error) => Err(NoFrame { id, reason: error.to_string() }),
         }
     }

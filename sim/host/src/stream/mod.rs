@@ -15,6 +15,8 @@
 //! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far, `estimator`, where that changes `estimator_change`; then the fields of [`Reconstruction`](dermis_golden::result::reconstruct::Reconstruction) |
 //! | refusal | `line`, `error`; the stream goes on |
 //!
+//! Frames whose values are known, as those of a recording, stand in place of lines, each once it is due ([`Input`]).
+//!
 //! With `input.average = k` 2^k frames give one result. A line is at most [`LONGEST_LINE`] bytes, so a queue of N lines
 //! takes at most N times that.
 //!
@@ -48,6 +50,7 @@ pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use rate::Clock;
+pub use reader::{DueFrame, Input};
 pub use source::Source;
 pub(crate) use source::DATAGRAM;
 pub use stop::Stop;

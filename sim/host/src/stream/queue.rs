@@ -98,6 +98,12 @@ impl<T> Queue<T> {
         open
     }
 
+    /// Whether an item that is added now is not waited for.
+    pub(super) fn takes(&self) -> bool {
+        let state = self.lock();
+        self.policy == Policy::Latest || state.items.len() < self.length || state.closed
+    }
+
     /// Ends the queue: what it holds is still taken.
     pub(super) fn close(&self) {
         self.lock().closed = true;

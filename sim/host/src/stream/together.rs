@@ -1,4 +1,5 @@
-//! Several streams that one thread answers, in turn: each has a thread that reads, a queue, and what its frames so far show.
+//! Several streams that one thread answers, in turn: each has a queue, a thread that fills it unless it is known when its frames are due,
+//! and what its frames so far show.
 //!
 //! ```text
 //! source 0 ── queue ─┐ bell
@@ -8,16 +9,16 @@
 //! A stream that has many lines is answered once, then the others that have one; what its queue does not hold meanwhile waits or is
 //! dropped, by its policy, and harms no other stream.
 
-use std::io::{Error as IoError, ErrorKind, Read, Result as IoResult};
+use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::sync::mpsc::{channel, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Error, Result};
 
 use super::answers::{Counts, Outcome, Output, Stream, StreamOptions};
 use super::estimators::Estimators;
 use super::queue::{Bell, Policy, Taken};
-use super::reader::Lines;
+use super::reader::{Input, Lines};
 use super::stop::Stop;
 use super::zero::ZeroRequest;
 
@@ -29,7 +30,7 @@ pub struct Member<'a> {
     /// What computes the results.
     pub estimators: Estimators<'a>,
     /// The source of its lines, and its name in errors.
-    pub input: (Box<dyn Read + Send>, String),
+    pub input: (Input, String),
     /// How it is read.
     pub options: StreamOptions,
     /// Asks for a new zero.
@@ -46,7 +47,7 @@ pub type Outputs<'a> = dyn FnMut(usize, &Outcome) -> IoResult<()> + 'a;
 /// Input or output that fails; a bad line is none.
 pub fn run(
     estimators: Estimators,
-    input: (Box<dyn Read + Send>, &str),
+    input: (impl Into<Input>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
@@ -60,11 +61,11 @@ pub fn run(
 pub fn run_until(
     stop: &Stop,
     estimators: Estimators,
-    (input, name): (Box<dyn Read + Send>, &str),
+    (input, name): (impl Into<Input>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
-    let own = Member { estimators, input: (input, name.to_owned()), options, zero: ZeroRequest::default() };
+    let own = Member { estimators, input: (input.into(), name.to_owned()), options, zero: ZeroRequest::default() };
     let named = |error: IoError| match error.kind() {
         ErrorKind::BrokenPipe => error,
         kind => IoError::new(kind, format!("standard output: {error}")),
@@ -88,7 +89,7 @@ impl Running<'_> {
         self.stream.dropped(if self.options.policy == Policy::Latest { full } else { 0 });
         let (done, next) = match item {
             Some(received) => {
-                (self.stream.answer(&received, if self.options.live { full } else { 0 }, output), Next::More)
+                (self.stream.answer(received, if self.options.live { full } else { 0 }, output), Next::More)
             }
             None if ended => (self.stream.finish(output), Next::Ended),
             None => (Ok(()), Next::More),
@@ -136,9 +137,14 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
         let lines = Lines::begin(input, (options.queue, options.policy), clock, Bell::new(index, ring.clone()), stop);
         running.push(Some(Running { stream, lines, options }));
     }
+    let mut due = vec![Some(Instant::now()); running.len()];
     while done.iter().any(Option::is_none) && !stop.stopped() {
         let waits = running.iter().flatten().any(|member| member.stream.waiting().is_some());
-        let heard = if waits { rung.recv_timeout(QUIET) } else { rung.recv().map_err(RecvTimeoutError::from) };
+        let until_due = bring(&mut running, &mut due).map(|at| at.saturating_duration_since(Instant::now()));
+        let heard = match until_due.into_iter().chain(waits.then_some(QUIET)).min() {
+            Some(most) => rung.recv_timeout(most),
+            None => rung.recv().map_err(RecvTimeoutError::from),
+        };
         for (index, member) in running.iter_mut().enumerate().filter(|_| waits) {
             match member.as_mut().map_or(Next::More, |member| member.settle(&mut |outcome| output(index, outcome))) {
                 Next::More => (),
@@ -162,6 +168,15 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
     let stopped =
         |member: Option<Running>| member.map_or_else(|| Ok(Counts::default()), |member| member.end(Next::More));
     all.map(|(member, done)| done.unwrap_or_else(|| stopped(member))).collect()
+}
+
+/// Puts the frames that are due into the queues, at most one of each stream; when the next one is due. `due` has that of each stream.
+fn bring(running: &mut [Option<Running>], due: &mut [Option<Instant>]) -> Option<Instant> {
+    let now = Instant::now();
+    for (due, member) in std::iter::zip(&mut *due, running).filter(|(due, _)| due.is_some_and(|at| at <= now)) {
+        *due = member.as_mut().and_then(|member| member.lines.bring(now));
+    }
+    due.iter().flatten().min().copied()
 }
 
 /// What comes of a line.
@@ -189,11 +204,12 @@ impl Next {
 mod tests {
     use super::*;
     use dermis_golden::data::frame::Frame;
+    use dermis_golden::data::recording::RecordedFrame;
     use dermis_golden::data::text::Stated;
     use dermis_golden::engine::CheckPace;
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, Scene};
-    use std::io::Cursor;
+    use std::io::{Cursor, Read};
 
     const OPTIONS: StreamOptions = StreamOptions {
         queue: 2,
@@ -206,7 +222,7 @@ mod tests {
     type Seen = Vec<(Vec<[f64; 3]>, u64)>;
 
     /// What streams of these inputs give together, and how each ends.
-    fn together(engine: &Golden, inputs: Vec<Box<dyn Read + Send>>) -> (Seen, Vec<Result<Counts>>) {
+    fn together(engine: &Golden, inputs: Vec<Input>) -> (Seen, Vec<Result<Counts>>) {
         let mut seen: Seen = vec![Default::default(); inputs.len()];
         let member = |input| Member {
             estimators: Estimators::only(engine, CheckPace::Never),
@@ -231,8 +247,70 @@ mod tests {
         frames.iter().map(line).collect()
     }
 
-    fn memory(text: String) -> Box<dyn Read + Send> {
-        Box::new(Cursor::new(text.into_bytes()))
+    fn memory(text: String) -> Input {
+        Input::Bytes(Box::new(Cursor::new(text.into_bytes())))
+    }
+
+    /// Frames that are due so many milliseconds from now.
+    fn due(frames: &[(u64, &Frame)], end: Option<IoError>) -> Input {
+        let begun = Instant::now();
+        let of = |(ms, frame): &(u64, &Frame)| {
+            let recorded = RecordedFrame { time_ns: *ms, shape: [8, 8], stress_MPa: frame.readings() };
+            Ok((begun + Duration::from_millis(*ms), recorded))
+        };
+        let all: Vec<_> = frames.iter().map(of).chain(end.map(Err)).collect();
+        Input::Frames(Box::new(all.into_iter()))
+    }
+
+    /// Frames in place of lines have the results of their lines, in their time, and end as lines do.
+    #[test]
+    fn frames_have_the_results_of_lines_once_they_are_due() {
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene));
+        let (begun, wanted) = (Instant::now(), together(&engine, vec![memory(lines(&frames[..2]))]).0.remove(0));
+        let later = due(&[(0, &frames[0]), (200, &frames[1])], None);
+        let failing = due(&[(0, &frames[0]), (0, &frames[1])], Some(IoError::other("is cut")));
+        let other = Frame { stress_MPa: vec![0.0; 63], ..frames[0].clone() };
+        let (seen, ends) = together(&engine, vec![later, failing, due(&[(0, &other)], None), due(&[], None)]);
+        assert!(begun.elapsed() >= Duration::from_millis(200));
+        assert_eq!(seen, [wanted.clone(), wanted, (vec![], 1), (vec![], 0)]);
+        assert_eq!(ends[1].as_ref().unwrap_err().to_string(), "memory: is cut");
+        assert!([0, 2, 3].iter().all(|own| ends[*own].is_ok()));
+    }
+
+    /// Of frames that are due while others are answered the latest are kept; no stop waits for one that is not due.
+    #[test]
+    fn frames_that_are_due_too_soon_are_dropped_and_a_stop_waits_for_none() {
+        const SOON: usize = 9;
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frame) = (Golden::new(&scene).unwrap(), &Frame::shipped(&scene)[0]);
+        let all = [vec![(0, frame); SOON], vec![(3_600_000, frame)]].concat();
+        let member = |input| Member {
+            estimators: Estimators::only(&engine, CheckPace::Never),
+            input: (input, "memory".to_owned()),
+            options: StreamOptions { policy: Policy::Latest, live: true, ..OPTIONS },
+            zero: ZeroRequest::default(),
+        };
+        let (mut lines, stop) = (Vec::new(), Stop::default());
+        // Frames of one stream become due while those of another one that came before them are answered.
+        let members = vec![member(due(&all, None)), member(due(&all, None))];
+        let ends = run_together(&stop, members, &mut |index, outcome| {
+            if let Outcome::Answer(answer) = outcome {
+                lines.push((index, answer.line, answer.dropped));
+            }
+            if (0..2).all(|index| lines.iter().any(|own| own.0 == index && own.1 == SOON as u64)) {
+                stop.now();
+            }
+            Ok(())
+        });
+        assert!(ends.iter().all(Result::is_ok));
+        for index in 0..2 {
+            let own: Vec<_> = lines.iter().filter(|own| own.0 == index).collect();
+            let last = own[own.len() - 1];
+            // Each frame is answered or dropped.
+            assert_eq!((last.1, last.2 + own.len() as u64), (SOON as u64, SOON as u64), "{lines:?}");
+            assert!(last.2 > 0, "{lines:?}");
+        }
     }
 
     /// Fails after its lines.
@@ -258,7 +336,7 @@ mod tests {
             memory(lines(&frames)),
             memory(lines(&frames[1..])),
             rubbish,
-            Box::new(failing),
+            Input::Bytes(Box::new(failing)),
             memory(String::new()),
         ];
         let (seen, ends) = together(&engine, inputs);
@@ -296,7 +374,7 @@ mod tests {
             options: StreamOptions { queue, policy, live: true, ..OPTIONS },
             zero: ZeroRequest::default(),
         };
-        let flood: Box<dyn Read + Send> = Box::new(Flood(line.clone().into_bytes(), 0));
+        let flood = Input::Bytes(Box::new(Flood(line.clone().into_bytes(), 0)));
         // All lines of the other one wait at once, and as many of the flood, so that it does not matter when its reader has its turn.
         let others = member(memory(line.repeat(WANTED)), WANTED, Policy::All);
         let (mut order, stop) = (Vec::new(), Stop::default());
