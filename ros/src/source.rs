@@ -34,7 +34,11 @@ pub fn input(patch: &Patch, state: Arc<PatchState>) -> Input {
 }
 
 /// The frames of a recording.
-fn recorded(patch: &Patch, path: &Path, state: Arc<PatchState>) -> impl Iterator<Item = Result<DueFrame>> + Send {
+fn recorded(
+    patch: &Patch,
+    path: &Path,
+    state: Arc<PatchState>,
+) -> impl Iterator<Item = Result<DueFrame>> + Send + use<> {
     let shape = Some([patch.scene.sensor.rows, patch.scene.sensor.cols]);
     let options = FrameOptions { shape, ..FrameOptions::default() };
     let opened = Paced::open(path.to_owned(), options, Pace::Recorded, [patch.fields.repeat, true]);

@@ -1,7 +1,7 @@
 //! Panels: a matrix for products with one vector after another, with the widest instructions that the processor has.
 //!
 //! ```text
-//! out_i ← out_i + Σ_j m_ij (factor · v_j)          added in the order of j, as `faer` does it: the same to the bit
+//! out_i ← out_i + Σ_j m_ij (factor · v_j)          added in the order of j
 //! ```
 //!
 //! The entries stand in the order in which they are read: [`ROWS`] rows of the first column, of the next one, …, then the next rows. So
@@ -133,24 +133,36 @@ mod tests {
     /// Also where rows fill no panel, and none is there.
     const SHAPES: [[usize; 2]; 7] = [[25, 25], [32, 5], [33, 40], [2, 128], [128, 100], [0, 3], [4, 0]];
 
+    /// Largest difference over the sum of the sizes of what is added, in units of the last place.
+    fn apart(own: &[f64], wanted: &[f64], sizes: &[f64], last_place: f64) -> f64 {
+        let apart = own.iter().zip(wanted).zip(sizes).map(|((own, wanted), size)| (own - wanted).abs() / size);
+        apart.fold(0.0, f64::max) / last_place
+    }
+
+    /// Sums that are rounded in another order differ by less than the number of their terms.
     #[test]
-    fn products_are_those_of_matrices_to_the_bit() {
+    fn products_are_those_of_matrices() {
         let mut random = Random::new(5);
         for [rows, cols] in SHAPES {
             let m = Mat::from_fn(rows, cols, |_, _| random.normal());
             let (v, before): (Vec<f64>, Vec<f64>) =
                 ((0..cols).map(|_| random.normal()).collect(), (0..rows).map(|_| random.normal()).collect());
+            let size =
+                |row: usize| before[row].abs() + (0..cols).map(|col| (m[(row, col)] * v[col]).abs()).sum::<f64>();
+            let sizes: Vec<f64> = (0..rows).map(size).collect();
             let (mut own, mut wanted) = (before.clone(), before.clone());
             Panels::new(m.as_ref()).accumulate(&v, -0.7, &mut own);
             accumulate(&m, &v, -0.7, &mut wanted);
-            assert_eq!(own, wanted, "{rows}×{cols}");
+            assert!(apart(&own, &wanted, &sizes, f64::EPSILON) <= cols as f64, "{rows}×{cols}");
             assert!(rows * cols == 0 || own != before);
             let single = |values: &[f64]| values.iter().map(|value| *value as f32).collect::<Vec<_>>();
+            let double = |values: &[f32]| values.iter().map(|value| f64::from(*value)).collect::<Vec<_>>();
             let (m, v) = (Mat::from_fn(rows, cols, |i, j| m[(i, j)] as f32), single(&v));
             let (mut own, mut wanted) = (single(&before), single(&before));
             Panels::new(m.as_ref()).accumulate(&v, 1.0, &mut own);
             matmul(ColMut::from_slice_mut(&mut wanted), Accum::Add, &m, ColRef::from_slice(&v), 1.0, Par::Seq);
-            assert_eq!(own, wanted, "{rows}×{cols}");
+            let apart = apart(&double(&own), &double(&wanted), &sizes, f64::from(f32::EPSILON));
+            assert!(apart <= cols as f64, "{rows}×{cols}");
         }
     }
 }
