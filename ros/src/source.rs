@@ -230,6 +230,5 @@ mod tests {
         std::fs::write(&path, "no recording").unwrap();
         let Input::Frames(mut frames) = opened(&path.display().to_string()) else { panic!("not a recording") };
         assert_eq!(frames.next().unwrap().unwrap_err().to_string(), "is no MCAP file");
-        assert!(frames.next().is_none());
     }
 }

@@ -21,7 +21,7 @@ pub type DueFrame = (Instant, RecordedFrame);
 pub enum Input {
     /// Bytes, whose lines are frames.
     Bytes(Box<dyn Read + Send>),
-    /// Frames, each in place of a line once it is due.
+    /// Frames, each in place of a line once it is due; none is asked for behind an error.
     Frames(Box<dyn Iterator<Item = std::io::Result<DueFrame>> + Send>),
 }
 

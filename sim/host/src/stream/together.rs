@@ -251,14 +251,15 @@ mod tests {
         Input::Bytes(Box::new(Cursor::new(text.into_bytes())))
     }
 
-    /// Frames that are due so many milliseconds from now.
+    /// Frames that are due so many milliseconds from now, and with an error behind them one more.
     fn due(frames: &[(u64, &Frame)], end: Option<IoError>) -> Input {
         let begun = Instant::now();
         let of = |(ms, frame): &(u64, &Frame)| {
             let recorded = RecordedFrame { time_ns: *ms, shape: [8, 8], stress_MPa: frame.readings() };
             Ok((begun + Duration::from_millis(*ms), recorded))
         };
-        let all: Vec<_> = frames.iter().map(of).chain(end.map(Err)).collect();
+        let behind = end.as_ref().and_then(|_| frames.first()).map(of);
+        let all: Vec<_> = frames.iter().map(of).chain(end.map(Err)).chain(behind).collect();
         Input::Frames(Box::new(all.into_iter()))
     }
 
