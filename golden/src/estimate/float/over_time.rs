@@ -125,7 +125,9 @@ impl Golden {
         let held = averaged(means, &longest, &window.mean);
         let explained =
             contacts.take().and_then(|contacts| self.explain(influences, means, sigma_MPa, &held.mean, contacts));
-        let own = explained.as_ref().map_or(LARGEST, |explained| explained.residual.min(LARGEST));
+        // Before the first frame there is nothing that could explain it.
+        let unexplained = if residual.is_some() { LARGEST } else { 1.0 };
+        let own = explained.as_ref().map_or(unexplained, |explained| explained.residual.min(LARGEST));
         let before = residual.unwrap_or(1.0);
         let mean = before + (own - before) / FRAMES;
         *residual = Some(mean);
