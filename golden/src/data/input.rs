@@ -203,10 +203,12 @@ impl Input {
             }
             false => means.longest(),
         };
-        let mean = Frame { stress_MPa: means.mean(&window), missing: means.never_read(), ..own };
-        let frames_held = if adapts { Some(window.frames_held()) } else { self.spec.frames_held(means.frames()) };
-        let lag_frames = adapts.then_some(window.age);
-        (Averaged { mean, variance: window.variance, frames_held, lag_frames }, complete)
+        let averaged = Averaged::of_window(means, &window, Frame { missing: means.never_read(), ..own });
+        let of_sliding = |averaged| {
+            let frames_held = self.spec.frames_held(means.frames());
+            Averaged { frames_held, lag_frames: None, ..averaged }
+        };
+        (if adapts { averaged } else { of_sliding(averaged) }, complete)
     }
 
     /// A frame with a value for each missing reading: the mean so far, else what the other taxels predict.

@@ -8,7 +8,7 @@
 
 use super::change_noise::ChangeNoise;
 use super::drift::Drift;
-use super::means::Means;
+use super::means::{Means, Window};
 use crate::data::frame::Frame;
 
 /// What the frames so far leave to the next ones; the default is that after a reset.
@@ -50,4 +50,16 @@ pub struct Averaged {
     pub frames_held: Option<usize>,
     /// Mean age of the frames that an adaptive mean holds.
     pub lag_frames: Option<f64>,
+}
+
+impl Averaged {
+    /// The mean of a window of an adaptive mean; `frame` has what does not depend on it.
+    pub(crate) fn of_window(means: &Means, window: &Window, frame: Frame) -> Averaged {
+        Averaged {
+            mean: Frame { stress_MPa: means.mean(window), ..frame },
+            variance: window.variance,
+            frames_held: Some(window.frames_held()),
+            lag_frames: Some(window.age),
+        }
+    }
 }

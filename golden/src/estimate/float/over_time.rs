@@ -7,7 +7,8 @@
 //! ```
 //! While a contact holds, its forces follow the newest frames, and its pressure has the noise of the longest mean. What the
 //! template leaves is judged over the last [`FRAMES`] frames; a frame that it does not explain at all ends it at once. The newest mean
-//! is that of the two shortest, the longer one as far as the forces have not changed since. Of a contact that moves the ratio is that of `ratio_mean`.
+//! is that of the two shortest, the longer one as far as the forces have not changed since. Of a contact that moves the ratio of shear to
+//! normal force is that of `ratio_mean`.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -32,8 +33,8 @@ const MOST: [f64; 2] = [2.5, 12.0];
 const LARGEST: f64 = 20.0;
 /// Residual over what the fit explains that is not counted: the error of the remembered pressure. A contact that moves leaves a fifth.
 const SHAPE_ERROR: f64 = 0.12;
-/// Force of a change over that of the fit. The remembered pressure is smoother than that of the contact, whose readings a larger force would
-/// explain: so by 8 % on drawn presses of sensor-1, with `network` and with `evidence`.
+/// Force of a change over that of the fit, which finds too large ones: chosen on drawn presses of sensor-1 whose shear turns and oscillates,
+/// with `network` and with `evidence`.
 const OF_FIT: f64 = 0.92;
 /// Stress over the noise above which a taxel that reads no tension presses.
 const PRESSES: f64 = 3.0;
@@ -83,16 +84,6 @@ struct Explained {
     sigma: f64,
 }
 
-/// The mean of a window of `means`; `frame` has what does not depend on it.
-fn averaged(means: &Means, window: &Window, frame: &Frame) -> Averaged {
-    Averaged {
-        mean: Frame { stress_MPa: means.mean(window), ..frame.clone() },
-        variance: window.variance,
-        frames_held: Some(window.frames_held()),
-        lag_frames: Some(window.age),
-    }
-}
-
 impl Golden {
     /// Reconstructs frames of one result, after those of which `past` is; it is then that after these frames. Of a mean that slides
     /// they are any number, of which the last one has the result.
@@ -121,8 +112,7 @@ impl Golden {
         let (Some(means), Some(sigma_MPa)) = (memory.means(), memory.sigma_MPa()) else {
             return self.of_mean(fit, memory, newest, &window);
         };
-        let longest = means.longest();
-        let held = averaged(means, &longest, &window.mean);
+        let held = Averaged::of_window(means, &means.longest(), window.mean.clone());
         let explained =
             contacts.take().and_then(|contacts| self.explain(influences, means, sigma_MPa, &held.mean, contacts));
         // Before the first frame there is nothing that could explain it.

@@ -91,7 +91,7 @@ mod tests {
             let mut outputs = first.stress.apply(&stress);
             let same = |(mu, sigma): ([f64; 2], [f64; 2]), wanted: ([f64; 2], [f64; 2])| {
                 let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
-                apart(mu, wanted.0) < 1e-4 && apart(sigma, wanted.1) < 1e-4
+                apart(mu, wanted.0) < 1e-5 && apart(sigma, wanted.1) < 1e-5
             };
             let plain = forward.shear(own, None);
             assert!(same(plain, network.shear_behind(outputs.clone())[0]), "{plain:?}");
